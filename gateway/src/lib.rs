@@ -1,0 +1,1 @@
+//! REST mission API, live stream and dashboard

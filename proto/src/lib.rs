@@ -1,0 +1,1 @@
+//! The wire contract between services: halcyon.v1 protobuf and its conversion to the model

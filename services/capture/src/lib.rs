@@ -1,0 +1,1 @@
+//! Stereo sources in: synchronise, stamp with pose, publish

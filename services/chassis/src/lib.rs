@@ -1,0 +1,1 @@
+//! What every service stands on: configuration, bus, topics, actors, clock, health, telemetry

@@ -1,0 +1,1 @@
+//! Missions, formation slots, assignment, dispatch plans

@@ -1,0 +1,123 @@
+//! Commands: each is a query with a typed answer, accepted or refused with a reason, never lost in silence.
+
+use crate::geo::LocalPoint;
+use crate::id::{MissionId, VehicleId};
+use crate::mission::MissionSpec;
+use crate::plan::Slot;
+use crate::time::Stamp;
+use crate::vehicle::FlightMode;
+
+/// The answer to any command.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CommandReply {
+    /// When it was decided.
+    pub stamp: Stamp,
+    /// Accepted or refused.
+    pub accepted: bool,
+    /// Why it was refused, or what was done.
+    pub reason: String,
+    /// The mission concerned, for mission commands that were accepted.
+    pub mission: Option<MissionId>,
+}
+
+impl CommandReply {
+    /// Accepted.
+    #[must_use]
+    pub fn accepted(stamp: Stamp, reason: impl Into<String>) -> Self {
+        Self { stamp, accepted: true, reason: reason.into(), mission: None }
+    }
+
+    /// Refused.
+    #[must_use]
+    pub fn refused(stamp: Stamp, reason: impl Into<String>) -> Self {
+        Self { stamp, accepted: false, reason: reason.into(), mission: None }
+    }
+}
+
+/// What to do with a mission.
+#[derive(Debug, Clone, PartialEq)]
+pub enum MissionAction {
+    /// A new one under this id; the same id with the same content again is answered as before.
+    Create(MissionId, MissionSpec),
+    /// A person says that the follower may go.
+    Approve(MissionId),
+    /// Send the follower now.
+    Dispatch(MissionId),
+    /// Everyone holds.
+    Pause(MissionId),
+    /// Go on.
+    Resume(MissionId),
+    /// Everyone returns. Works from every state.
+    Abort(MissionId),
+}
+
+/// A command to the mission planner.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MissionCommand {
+    /// When it was issued.
+    pub stamp: Stamp,
+    /// After this it must not be carried out.
+    pub deadline: Stamp,
+    /// Who issued it.
+    pub who: String,
+    /// What.
+    pub action: MissionAction,
+}
+
+/// What to do with a vehicle.
+#[derive(Debug, Clone, PartialEq)]
+pub enum VehicleAction {
+    /// Arm the motors.
+    Arm,
+    /// Disarm on the ground.
+    Disarm,
+    /// Climb to a height above the take-off point, metres.
+    TakeOff {
+        /// Height, metres.
+        height_m: f64,
+    },
+    /// Fly to a place at a height above mean water.
+    GoTo {
+        /// Where.
+        point: LocalPoint,
+        /// Height, metres.
+        height_m: f64,
+    },
+    /// Keep a slot beside a leader.
+    Follow {
+        /// Whom.
+        leader: VehicleId,
+        /// Where.
+        slot: Slot,
+    },
+    /// Stop and hold.
+    Hold,
+    /// Land here.
+    Land,
+    /// Fly home and land.
+    Return,
+    /// Change the flight mode.
+    SetMode(FlightMode),
+    /// Turn to a heading, radians clockwise from true north.
+    SetHeading {
+        /// Heading, radians.
+        heading_rad: f64,
+    },
+    /// Stop the motors now, in the air or not.
+    Terminate,
+}
+
+/// A command to one vehicle.
+#[derive(Debug, Clone, PartialEq)]
+pub struct VehicleCommand {
+    /// When it was issued.
+    pub stamp: Stamp,
+    /// After this it must not be carried out.
+    pub deadline: Stamp,
+    /// Who issued it.
+    pub who: String,
+    /// To which vehicle; a vehicle refuses what is meant for another.
+    pub vehicle: VehicleId,
+    /// What.
+    pub action: VehicleAction,
+}

@@ -1,0 +1,1 @@
+//! Wave theory and wave statistics: dispersion, spectra, zero crossings

@@ -1,0 +1,1 @@
+//! Calibrate, rectify, match, triangulate, fit the plane, grid the surface

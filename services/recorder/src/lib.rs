@@ -1,0 +1,1 @@
+//! The flight recorder: everything on the bus to MCAP, and replay

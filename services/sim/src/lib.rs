@@ -1,0 +1,1 @@
+//! Seeded simulation: water, wind, sensors, camera rig, multicopter

@@ -1,0 +1,1 @@
+//! MAVLink to the autopilot: state, commands, guidance in formation, fail-safes

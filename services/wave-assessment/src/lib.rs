@@ -1,0 +1,1 @@
+//! Surface patches over a window to sea state and verdict

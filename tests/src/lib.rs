@@ -1,0 +1,1 @@
+//! Stories across services, mesh and fault tests, the layering test
