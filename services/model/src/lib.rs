@@ -22,6 +22,7 @@ pub mod geo;
 pub mod id;
 pub mod mission;
 pub mod plan;
+pub mod rig_yaml;
 pub mod sea;
 pub mod service;
 pub mod stereo;
