@@ -5,17 +5,34 @@
 //! | [`dispersion`] | linear dispersion in water of any depth |
 //! | [`spectrum`] | JONSWAP and Pierson-Moskowitz spectra, their moments |
 //! | [`spreading`] | cos-2s directional spreading |
+//! | [`record`] | an evenly sampled record, checked |
+//! | [`crossing`] | zero-crossing analysis: waves, H_m, H_s, H_1/10, H_max, T_z, T_1/3 |
+//! | [`welch`] | Welch's spectrum, H_m0, T_p, T_m01, T_m02, T_e |
+//! | [`height`] | Rayleigh heights, the expected highest wave |
+//! | [`confidence`] | confidence limits of variances |
+//! | [`filter`], [`spline`] | splitting a record by frequency; uneven samples to even ones |
 //!
 //! Elevation is positive up, metres; densities are one-sided, m²/Hz.
 //!
 //! **Invariant:** nothing here knows of patches, vehicles or messages; both the simulator and the estimators use it, and so it
 //! holds theory and no simulation.
 
+pub mod confidence;
+pub mod crossing;
 pub mod dispersion;
+pub mod filter;
+pub mod height;
+pub mod record;
 mod special;
 pub mod spectrum;
+pub mod spline;
 pub mod spreading;
+pub mod welch;
 
+pub use crossing::{Crossing, Wave, WaveStatistics};
 pub use dispersion::{Depth, GRAVITY_MPS2};
+pub use record::{Record, RecordError};
 pub use spectrum::{Jonswap, PiersonMoskowitz, Spectrum, SpectrumError};
+pub use spline::Spline;
 pub use spreading::CosTwoS;
+pub use welch::{SampledSpectrum, SpectralStatistics, Welch};

@@ -1,0 +1,66 @@
+//! Confidence limits of variances: what a finite record leaves open.
+
+use crate::special::gamma_p;
+
+/// The value that a chi-square variable of `dof` degrees of freedom stays under with probability `p`.
+///
+/// `dof` need not be whole. NaN unless 0 < `p` < 1 and `dof` is positive and finite. Bisection on the incomplete gamma function.
+#[must_use]
+pub fn chi_square_quantile(p: f64, dof: f64) -> f64 {
+    if !(p > 0.0 && p < 1.0 && dof > 0.0 && dof.is_finite()) {
+        return f64::NAN;
+    }
+    let (mut low, mut high) = (0.0, dof.max(1.0));
+    while gamma_p(0.5 * dof, 0.5 * high) < p && high < 1e300 {
+        high *= 2.0;
+    }
+    for _ in 0..100 {
+        let middle = 0.5 * (low + high);
+        if gamma_p(0.5 * dof, 0.5 * middle) < p {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    0.5 * (low + high)
+}
+
+/// Factors (low, high) on an estimated variance of `dof` degrees of freedom, between which the true one lies with 95 % confidence.
+#[must_use]
+pub fn variance_factors_95(dof: f64) -> (f64, f64) {
+    (dof / chi_square_quantile(0.975, dof), dof / chi_square_quantile(0.025, dof))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    /// Pearson & Hartley's tables, and the closed form −2 ln(1 − p) for two degrees of freedom.
+    #[test]
+    fn quantiles_are_the_published_ones() {
+        for (p, dof, expected) in [
+            (0.025, 1.0, 0.000_982_069),
+            (0.975, 1.0, 5.023_886),
+            (0.025, 10.0, 3.246_973),
+            (0.975, 10.0, 20.483_177),
+            (0.025, 30.0, 16.790_772),
+            (0.975, 30.0, 46.979_242),
+            (0.975, 100.0, 129.561_197),
+        ] {
+            assert_relative_eq!(chi_square_quantile(p, dof), expected, max_relative = 1e-5);
+        }
+        for p in [0.01, 0.3, 0.999] {
+            assert_relative_eq!(chi_square_quantile(p, 2.0), -2.0 * (1.0f64 - p).ln(), max_relative = 1e-9);
+        }
+        let normal_limit = variance_factors_95(1e5);
+        assert_relative_eq!(normal_limit.1, 1.0 + 1.96 * (2e-5f64).sqrt(), max_relative = 1e-3);
+    }
+
+    #[test]
+    fn nonsense_is_nan() {
+        for (p, dof) in [(0.0, 1.0), (1.0, 1.0), (0.5, 0.0), (f64::NAN, 1.0), (0.5, f64::NAN), (0.5, f64::INFINITY)] {
+            assert!(chi_square_quantile(p, dof).is_nan());
+        }
+    }
+}
