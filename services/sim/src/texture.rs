@@ -1,0 +1,193 @@
+//! What floats on and in the water: a seeded, periodic picture of its albedo, band-limited so that cameras don't alias it.
+//!
+//! Ripple and turbidity are cubic B-spline noise in octaves, foam lies in streaks, flecks are sparse bright dots. The finest grain
+//! is [`GRAIN_M`]: just under two pixels of the default rig at 5 m, fine enough to match and coarse enough to sample.
+//! Coarser copies (each half the resolution, low-pass filtered) serve cameras that are higher up.
+
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+
+/// Texels along each side of the finest level; a power of two, so that wrapping is a mask.
+const SIDE: usize = 1024;
+/// Side of a texel, metres. The pattern repeats after `SIDE` of them: 7.2 m, far more than any disparity can confuse.
+const TEXEL_M: f64 = 0.007;
+/// Spacing of the finest noise lattice, metres.
+pub const GRAIN_M: f64 = 4.0 * TEXEL_M;
+/// Ground footprint of a pixel from which a coarser level is used, metres.
+const FOOTPRINT_M_MAX: f64 = 0.68 * GRAIN_M;
+/// Albedo of clean water seen from above.
+const WATER_ALBEDO: f32 = 0.035;
+/// Lattice spacing in texels and standard deviation of albedo of each octave.
+const OCTAVES: [(usize, f32); 5] = [(4, 0.0060), (8, 0.0050), (16, 0.0035), (64, 0.0025), (256, 0.0020)];
+/// Bright flecks per square metre.
+const FLECKS_PER_M2: f64 = 9.0;
+
+/// A periodic texture, finest level first. Rows run north, columns east.
+#[derive(Debug, Clone)]
+pub struct Texture {
+    levels: Vec<Level>,
+}
+
+/// One resolution of it.
+#[derive(Debug, Clone)]
+pub(crate) struct Level {
+    texels: Vec<f32>,
+    mask: usize,
+    shift: u32,
+    /// Texels per metre.
+    pub(crate) per_m: f64,
+}
+
+impl Texture {
+    /// Water with ripples, foam and flecks.
+    #[must_use]
+    pub fn water(seed: u64) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x7465_7874_7572_6531);
+        let mut albedo = vec![WATER_ALBEDO; SIDE * SIDE];
+        let mut foam = vec![0.0; SIDE * SIDE];
+        for (pitch, sigma) in OCTAVES {
+            let noise = spline_noise(pitch, &mut rng);
+            for ((albedo, foam), noise) in albedo.iter_mut().zip(&mut foam).zip(&noise) {
+                *albedo += sigma * noise;
+                // Foam gathers where the middle octaves agree.
+                *foam += if (16..256).contains(&pitch) { 0.7 * noise } else { 0.25 * noise };
+            }
+        }
+        for (albedo, foam) in albedo.iter_mut().zip(&foam) {
+            // A smooth step, so that edges stay as soft as the noise itself.
+            let t = ((foam - 1.2) / 1.4).clamp(0.0, 1.0);
+            *albedo = (*albedo + 0.030 * t * t * (3.0 - 2.0 * t)).max(0.004);
+        }
+        let area_m2 = (SIDE as f64 * TEXEL_M).powi(2);
+        for _ in 0..(area_m2 * FLECKS_PER_M2) as usize {
+            let radius = rng.random_range(2.2..3.4_f32);
+            let peak = rng.random_range(0.02..0.07_f32);
+            fleck(&mut albedo, rng.random_range(0.0..SIDE as f32), rng.random_range(0.0..SIDE as f32), radius, peak);
+        }
+        Self::from_texels(albedo, SIDE, TEXEL_M)
+    }
+
+    /// A texture of your own: `albedo(north_m, east_m)` on `side × side` texels of `texel_m`, repeated for ever. `side` is rounded
+    /// up to a power of two. Sampling is bilinear: leave nothing finer than a few texels in it.
+    #[must_use]
+    pub fn from_fn(side: usize, texel_m: f64, albedo: impl Fn(f64, f64) -> f64) -> Self {
+        let side = side.clamp(2, 1 << 12).next_power_of_two();
+        let at = |i: usize| albedo((i / side) as f64 * texel_m, (i % side) as f64 * texel_m) as f32;
+        Self::from_texels((0..side * side).map(at).collect(), side, texel_m)
+    }
+
+    fn from_texels(texels: Vec<f32>, side: usize, texel_m: f64) -> Self {
+        let mut levels = vec![Level { texels, mask: side - 1, shift: side.trailing_zeros(), per_m: 1.0 / texel_m }];
+        while let Some(finer) = levels.last()
+            && finer.mask >= 32
+        {
+            let coarser = finer.halved();
+            levels.push(coarser);
+        }
+        Self { levels }
+    }
+
+    /// The finest level that a pixel covering `footprint_m` of water does not alias.
+    pub(crate) fn level(&self, footprint_m: f64) -> &Level {
+        // In texels, so that it holds for a texture of any resolution.
+        let finest_m = FOOTPRINT_M_MAX / TEXEL_M / self.levels[0].per_m;
+        let octave = (footprint_m / finest_m).log2().ceil().clamp(0.0, (self.levels.len() - 1) as f64);
+        &self.levels[octave as usize]
+    }
+}
+
+impl Level {
+    /// Texels after which it repeats.
+    pub(crate) fn period(&self) -> f64 {
+        (self.mask + 1) as f64
+    }
+
+    /// Albedo at a place in texels, bilinear; both must be positive.
+    #[inline]
+    pub(crate) fn sample(&self, north: f32, east: f32) -> f32 {
+        let (row, col) = (north as usize, east as usize);
+        let (u, v) = (north - row as f32, east - col as f32);
+        let low = (row & self.mask) << self.shift;
+        let high = ((row + 1) & self.mask) << self.shift;
+        let (left, right) = (col & self.mask, (col + 1) & self.mask);
+        let a = self.texels[low | left];
+        let b = self.texels[low | right];
+        let c = self.texels[high | left];
+        let d = self.texels[high | right];
+        let ab = a + (b - a) * v;
+        let cd = c + (d - c) * v;
+        ab + (cd - ab) * u
+    }
+
+    /// Half the resolution, after a 1-4-6-4-1 low-pass filter in both directions, which leaves everything in its place.
+    fn halved(&self) -> Self {
+        const WEIGHTS: [f32; 5] = [0.0625, 0.25, 0.375, 0.25, 0.0625];
+        let side = (self.mask + 1) / 2;
+        // Two texels before `at`, wrapped: adding the mask is subtracting one.
+        let tap = |at: usize, k: usize| (2 * at + 2 * self.mask + k) & self.mask;
+        let mut texels = vec![0.0; side * side];
+        let mut row_sums = vec![0.0; self.mask + 1];
+        for row in 0..side {
+            for (col, sum) in row_sums.iter_mut().enumerate() {
+                *sum = (0..5).map(|k| WEIGHTS[k] * self.texels[(tap(row, k) << self.shift) | col]).sum::<f32>();
+            }
+            for col in 0..side {
+                texels[row * side + col] = (0..5).map(|k| WEIGHTS[k] * row_sums[tap(col, k)]).sum::<f32>();
+            }
+        }
+        Self { texels, mask: side - 1, shift: self.shift - 1, per_m: 0.5 * self.per_m }
+    }
+}
+
+/// Periodic noise of zero mean and unit variance: cubic B-splines over a lattice of random numbers `pitch` texels apart.
+fn spline_noise(pitch: usize, rng: &mut ChaCha8Rng) -> Vec<f32> {
+    let nodes = SIDE / pitch;
+    let lattice: Vec<f32> = (0..nodes * nodes).map(|_| rng.random_range(-1.0..1.0)).collect();
+    let weights: Vec<[f32; 4]> = (0..pitch)
+        .map(|i| {
+            let t = i as f32 / pitch as f32;
+            let s = 1.0 - t;
+            [
+                s * s * s / 6.0,
+                (4.0 - 6.0 * t * t + 3.0 * t * t * t) / 6.0,
+                (4.0 - 6.0 * s * s + 3.0 * s * s * s) / 6.0,
+                t * t * t / 6.0,
+            ]
+        })
+        .collect();
+    // Along each lattice row first, then across.
+    let mut rows = vec![0.0; nodes * SIDE];
+    for row in 0..nodes {
+        for col in 0..SIDE {
+            let (node, w) = (col / pitch, &weights[col % pitch]);
+            let at = |k: usize| lattice[row * nodes + (node + nodes + k - 1) % nodes];
+            rows[row * SIDE + col] = w[0] * at(0) + w[1] * at(1) + w[2] * at(2) + w[3] * at(3);
+        }
+    }
+    let mut noise = Vec::with_capacity(SIDE * SIDE);
+    for row in 0..SIDE {
+        let (node, w) = (row / pitch, &weights[row % pitch]);
+        let at = |k: usize| &rows[(node + nodes + k - 1) % nodes * SIDE..][..SIDE];
+        let (a, b, c, d) = (at(0), at(1), at(2), at(3));
+        noise.extend((0..SIDE).map(|col| w[0] * a[col] + w[1] * b[col] + w[2] * c[col] + w[3] * d[col]));
+    }
+    let count = noise.len() as f32;
+    let mean = noise.iter().sum::<f32>() / count;
+    let sigma = (noise.iter().map(|n| (n - mean) * (n - mean)).sum::<f32>() / count).sqrt();
+    noise.iter_mut().for_each(|n| *n = (*n - mean) / sigma);
+    noise
+}
+
+/// Adds a round bright spot with a Gaussian profile of `radius` texels (one standard deviation).
+fn fleck(albedo: &mut [f32], row: f32, col: f32, radius: f32, peak: f32) {
+    let reach = (3.5 * radius) as isize;
+    for i in -reach..=reach {
+        for j in -reach..=reach {
+            let (y, x) = (row.floor() + i as f32, col.floor() + j as f32);
+            let gauss = (-((y - row).powi(2) + (x - col).powi(2)) / (2.0 * radius * radius)).exp();
+            let wrapped = |v: f32| (v as isize).rem_euclid(SIDE as isize) as usize;
+            albedo[wrapped(y) * SIDE + wrapped(x)] += peak * gauss;
+        }
+    }
+}
