@@ -23,7 +23,7 @@ fn cpu_s() -> f64 {
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let start = cpu_s();
     let texture = Arc::new(Texture::water(4));
-    let texture_s = (cpu_s() - start);
+    let texture_s = cpu_s() - start;
     let mut renderer = Renderer::new(&RigConfig::default(), texture)?;
     println!("set-up {:.0} ms, of which texture {:.0} ms", 1e3 * (cpu_s() - start), 1e3 * texture_s);
     let attitude = UnitQuaternion::from_euler_angles(0.03, -0.02, 0.7);
@@ -35,7 +35,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let start = cpu_s();
             let mut pair = None;
             for frame in 0..FRAMES {
-                let stamp = Stamp::from_nanos(1_780_000_000_000_000_000).plus_secs_f64(0.2 * f64::from(FRAMES));
+                let stamp = Stamp::from_nanos(1_780_000_000_000_000_000).plus_secs_f64(0.2 * f64::from(frame));
                 pair = Some(renderer.render_pair(&water, &attitude, Vector3::new(3.0, 4.0, -height_m), stamp, 1)?);
             }
             println!("{name}, {height_m} m: {:.1} ms a pair", 1e3 * (cpu_s() - start) / f64::from(FRAMES));

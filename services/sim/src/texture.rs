@@ -18,10 +18,18 @@ pub const GRAIN_M: f64 = 4.0 * TEXEL_M;
 const FOOTPRINT_M_MAX: f64 = 0.68 * GRAIN_M;
 /// Albedo of clean water seen from above.
 const WATER_ALBEDO: f32 = 0.035;
-/// Lattice spacing in texels and standard deviation of albedo of each octave.
-const OCTAVES: [(usize, f32); 5] = [(4, 0.0060), (8, 0.0050), (16, 0.0035), (64, 0.0025), (256, 0.0020)];
+/// Each octave of ripple and turbidity: lattice spacing across and along the wind's streaks, texels, whether the streaks run
+/// diagonally, standard deviation of albedo, and weight in where foam gathers.
+const OCTAVES: [([usize; 2], bool, f32, f32); 6] = [
+    ([4, 4], false, 0.0040, 0.15),
+    ([8, 16], true, 0.0048, 0.30),
+    ([8, 8], false, 0.0024, 0.20),
+    ([32, 128], true, 0.0026, 0.75),
+    ([64, 64], false, 0.0022, 0.45),
+    ([256, 256], false, 0.0020, 0.35),
+];
 /// Bright flecks per square metre.
-const FLECKS_PER_M2: f64 = 9.0;
+const FLECKS_PER_M2: f64 = 6.0;
 
 /// A periodic texture, finest level first. Rows run north, columns east.
 #[derive(Debug, Clone)]
@@ -46,18 +54,21 @@ impl Texture {
         let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x7465_7874_7572_6531);
         let mut albedo = vec![WATER_ALBEDO; SIDE * SIDE];
         let mut foam = vec![0.0; SIDE * SIDE];
-        for (pitch, sigma) in OCTAVES {
+        for (pitch, diagonal, sigma, gathers) in OCTAVES {
             let noise = spline_noise(pitch, &mut rng);
-            for ((albedo, foam), noise) in albedo.iter_mut().zip(&mut foam).zip(&noise) {
+            for (at, (albedo, foam)) in albedo.iter_mut().zip(&mut foam).enumerate() {
+                // A turn by 45° that keeps the pattern periodic; it is finer by √2 there.
+                let (row, col) = (at / SIDE, at % SIDE);
+                let turned = ((row + col) & (SIDE - 1)) * SIDE + ((SIDE + col - row) & (SIDE - 1));
+                let noise = noise[if diagonal { turned } else { at }];
                 *albedo += sigma * noise;
-                // Foam gathers where the middle octaves agree.
-                *foam += if (16..256).contains(&pitch) { 0.7 * noise } else { 0.25 * noise };
+                *foam += gathers * noise;
             }
         }
         for (albedo, foam) in albedo.iter_mut().zip(&foam) {
             // A smooth step, so that edges stay as soft as the noise itself.
-            let t = ((foam - 1.2) / 1.4).clamp(0.0, 1.0);
-            *albedo = (*albedo + 0.030 * t * t * (3.0 - 2.0 * t)).max(0.004);
+            let t = ((foam - 1.3) / 1.6).clamp(0.0, 1.0);
+            *albedo = (*albedo + 0.034 * t * t * (3.0 - 2.0 * t)).max(0.004);
         }
         let area_m2 = (SIDE as f64 * TEXEL_M).powi(2);
         for _ in 0..(area_m2 * FLECKS_PER_M2) as usize {
@@ -140,35 +151,26 @@ impl Level {
     }
 }
 
-/// Periodic noise of zero mean and unit variance: cubic B-splines over a lattice of random numbers `pitch` texels apart.
-fn spline_noise(pitch: usize, rng: &mut ChaCha8Rng) -> Vec<f32> {
-    let nodes = SIDE / pitch;
-    let lattice: Vec<f32> = (0..nodes * nodes).map(|_| rng.random_range(-1.0..1.0)).collect();
-    let weights: Vec<[f32; 4]> = (0..pitch)
-        .map(|i| {
-            let t = i as f32 / pitch as f32;
-            let s = 1.0 - t;
-            [
-                s * s * s / 6.0,
-                (4.0 - 6.0 * t * t + 3.0 * t * t * t) / 6.0,
-                (4.0 - 6.0 * s * s + 3.0 * s * s * s) / 6.0,
-                t * t * t / 6.0,
-            ]
-        })
-        .collect();
-    // Along each lattice row first, then across.
-    let mut rows = vec![0.0; nodes * SIDE];
-    for row in 0..nodes {
+/// Periodic noise of zero mean and unit variance: cubic B-splines over a lattice of random numbers, `pitch` texels apart down and
+/// across.
+fn spline_noise([down, across]: [usize; 2], rng: &mut ChaCha8Rng) -> Vec<f32> {
+    let (rows, cols) = (SIDE / down, SIDE / across);
+    let lattice: Vec<f32> = (0..rows * cols).map(|_| rng.random_range(-1.0..1.0)).collect();
+    // Along each lattice row first, then down.
+    let weights = spline_weights(across);
+    let mut stretched = vec![0.0; rows * SIDE];
+    for row in 0..rows {
         for col in 0..SIDE {
-            let (node, w) = (col / pitch, &weights[col % pitch]);
-            let at = |k: usize| lattice[row * nodes + (node + nodes + k - 1) % nodes];
-            rows[row * SIDE + col] = w[0] * at(0) + w[1] * at(1) + w[2] * at(2) + w[3] * at(3);
+            let (node, w) = (col / across, &weights[col % across]);
+            let at = |k: usize| lattice[row * cols + (node + cols + k - 1) % cols];
+            stretched[row * SIDE + col] = w[0] * at(0) + w[1] * at(1) + w[2] * at(2) + w[3] * at(3);
         }
     }
+    let weights = spline_weights(down);
     let mut noise = Vec::with_capacity(SIDE * SIDE);
     for row in 0..SIDE {
-        let (node, w) = (row / pitch, &weights[row % pitch]);
-        let at = |k: usize| &rows[(node + nodes + k - 1) % nodes * SIDE..][..SIDE];
+        let (node, w) = (row / down, &weights[row % down]);
+        let at = |k: usize| &stretched[(node + rows + k - 1) % rows * SIDE..][..SIDE];
         let (a, b, c, d) = (at(0), at(1), at(2), at(3));
         noise.extend((0..SIDE).map(|col| w[0] * a[col] + w[1] * b[col] + w[2] * c[col] + w[3] * d[col]));
     }
@@ -177,6 +179,17 @@ fn spline_noise(pitch: usize, rng: &mut ChaCha8Rng) -> Vec<f32> {
     let sigma = (noise.iter().map(|n| (n - mean) * (n - mean)).sum::<f32>() / count).sqrt();
     noise.iter_mut().for_each(|n| *n = (*n - mean) / sigma);
     noise
+}
+
+/// The uniform cubic B-spline's four weights at each of `pitch` places between two nodes.
+fn spline_weights(pitch: usize) -> Vec<[f32; 4]> {
+    let at = |i: usize| {
+        let t = i as f32 / pitch as f32;
+        let s = 1.0 - t;
+        let inner = |x: f32| (4.0 - 6.0 * x * x + 3.0 * x * x * x) / 6.0;
+        [s * s * s / 6.0, inner(t), inner(s), t * t * t / 6.0]
+    };
+    (0..pitch).map(at).collect()
 }
 
 /// Adds a round bright spot with a Gaussian profile of `radius` texels (one standard deviation).

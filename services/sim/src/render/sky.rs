@@ -1,11 +1,11 @@
 //! The light on the water: a graded sky with a veiled sun, and how much of it the surface mirrors.
 
 /// Radiance of the sky overhead, in units of a white sheet's on the water.
-const ZENITH: f32 = 0.45;
+const ZENITH: f32 = 0.40;
 /// Radiance of the sky at the horizon.
-const HORIZON: f32 = 1.0;
+const HORIZON: f32 = 1.1;
 /// Radiance that the haze about the sun adds at its centre. The disc itself is veiled: no glint that blinds a camera.
-const HAZE: f32 = 1.6;
+const HAZE: f32 = 2.6;
 /// Direction of the sun (north, east, up), unit: 50° high in the south-west.
 const SUN: [f32; 3] = [-0.4545, -0.4545, 0.7660];
 /// Reflectance of water seen straight on, for a refractive index of 1.333.
