@@ -134,7 +134,7 @@ impl Level {
     /// Half the resolution, after a 1-4-6-4-1 low-pass filter in both directions, which leaves everything in its place.
     fn halved(&self) -> Self {
         const WEIGHTS: [f32; 5] = [0.0625, 0.25, 0.375, 0.25, 0.0625];
-        let side = (self.mask + 1) / 2;
+        let side = self.texels.len() >> (self.shift + 1);
         // Two texels before `at`, wrapped: adding the mask is subtracting one.
         let tap = |at: usize, k: usize| (2 * at + 2 * self.mask + k) & self.mask;
         let mut texels = vec![0.0; side * side];

@@ -11,6 +11,7 @@ use halcyon_sim::water::Water;
 /// An afternoon in 2026, to the nanosecond.
 const NOW: Stamp = Stamp::from_nanos(1_780_000_000_123_456_789);
 
+#[allow(clippy::unwrap_used, reason = "a helper of tests")]
 fn water(config: &SeaConfig) -> Water {
     Water::new(config, 7).unwrap()
 }
@@ -167,12 +168,12 @@ fn the_seed_is_the_sea() {
 #[test]
 fn seas_that_cannot_be_are_refused() {
     #[track_caller]
-    fn check(config: SeaConfig, expected: &str) {
-        assert_eq!(Water::new(&config, 1).unwrap_err().to_string(), expected);
+    fn check(config: &SeaConfig, expected: &str) {
+        assert_eq!(Water::new(config, 1).unwrap_err().to_string(), expected);
     }
-    check(SeaConfig { height_m: -1.0, ..SeaConfig::default() }, "sea height_m must be from 0 to 30, not -1");
-    check(SeaConfig { period_s: f64::NAN, ..SeaConfig::default() }, "sea period_s must be from 0.3 to 30, not NaN");
-    check(SeaConfig { gamma: 0.5, ..SeaConfig::default() }, "sea gamma must be from 1 to 20, not 0.5");
-    check(SeaConfig { components: 100_000, ..SeaConfig::default() }, "sea components must be from 16 to 256, not 100000");
+    check(&SeaConfig { height_m: -1.0, ..SeaConfig::default() }, "sea height_m must be from 0 to 30, not -1");
+    check(&SeaConfig { period_s: f64::NAN, ..SeaConfig::default() }, "sea period_s must be from 0.3 to 30, not NaN");
+    check(&SeaConfig { gamma: 0.5, ..SeaConfig::default() }, "sea gamma must be from 1 to 20, not 0.5");
+    check(&SeaConfig { components: 100_000, ..SeaConfig::default() }, "sea components must be from 16 to 256, not 100000");
     assert!(matches!(Water::new(&SeaConfig::regular(1.0, 1.0, 0.0), 1), Err(SeaError::Steep { .. })));
 }
