@@ -8,6 +8,7 @@ import type { Mission, MissionPhase, Possibility } from '../../api/types';
 const yes: Possibility = { allowed: true, why: '' };
 const no = (why: string): Possibility => ({ allowed: false, why });
 
+const BEFORE_APPROVAL: readonly MissionPhase[] = ['waiting', 'transit', 'assessing', 'awaiting_approval'];
 const FINAL: readonly MissionPhase[] = ['completed', 'aborted', 'failed'];
 
 export const isFinal = (mission: Mission): boolean => FINAL.includes(mission.phase);
@@ -22,10 +23,17 @@ export function can(mission: Mission, action: MissionAction, live: boolean): Pos
 /** Whether a mission can be created now. */
 export const canCreate = (live: boolean): Possibility => (live ? yes : no('Not connected to the gateway'));
 
+/** What sends the mission on: shown, though disabled, from the start, so that a person knows that it will be asked for. */
+function forward(mission: Mission): MissionAction[] {
+  const { approve, dispatch } = mission.can;
+  if (approve.allowed) return ['approve'];
+  if (dispatch.allowed) return ['dispatch'];
+  return mission.approval === 'manual' && BEFORE_APPROVAL.includes(mission.phase) ? ['approve'] : [];
+}
+
 /** The buttons worth showing, the likeliest first. Abort is always there until the end. */
 export function offered(mission: Mission): MissionAction[] {
   if (isFinal(mission)) return [];
   const rest: MissionAction = mission.phase === 'paused' ? 'resume' : 'pause';
-  const needsDispatch = mission.can.dispatch.allowed && !mission.can.approve.allowed;
-  return [needsDispatch ? 'dispatch' : 'approve', rest, 'abort'];
+  return [...forward(mission), rest, 'abort'];
 }

@@ -29,6 +29,11 @@ describe('buttons', () => {
     expect(offered(mission({ phase: 'paused' }))).toContain('resume');
     for (const phase of ['completed', 'aborted', 'failed'] as const) expect(offered(mission({ phase }))).toEqual([]);
   });
+  it('approval is announced from the start, and gone once given', () => {
+    expect(offered(mission({ phase: 'assessing' }))).toEqual(['approve', 'pause', 'abort']);
+    expect(offered(mission({ phase: 'landing' }))).toEqual(['pause', 'abort']);
+    expect(offered(mission({ phase: 'assessing', approval: 'automatic' }))).toEqual(['pause', 'abort']);
+  });
   it('dispatch replaces approve once only that is left', () => {
     expect(offered(mission({ phase: 'approved', can: { ...mission().can, dispatch: yes } }))[0]).toBe('dispatch');
     expect(offered(mission({ phase: 'awaiting_approval', can: { ...mission().can, dispatch: yes, approve: yes } }))[0]).toBe('approve');

@@ -23,7 +23,7 @@ export function judge(heard: Heard<SeaState> | undefined, phase: LinkPhase, flee
   if (phase !== 'live') {
     return unknown('Unknown', heard === undefined ? 'Not connected to the gateway.' : 'Not connected: what is shown below is history.');
   }
-  if (heard === undefined || fleetNow_ms === null) return unknown('No measurement', 'No rig has reported a sea state yet.');
+  if (heard === undefined || fleetNow_ms === null) return unknown('No measurement', 'No sea state has come in yet.');
   const { verdict, stale, rig } = heard.value;
   const left_s = (Date.parse(verdict.valid_until) - fleetNow_ms) / 1000;
   if (verdict.expired || !(left_s > 0)) return unknown('Expired', `The last verdict (${verdict.state}) has run out.`);
