@@ -4,6 +4,7 @@ import { mission, stamp, T0, vehicle } from '../state/fixtures';
 import { EMPTY, reduce, type FleetState } from '../state/reduce';
 import { compose, extent, type ComposeInput } from './compose';
 import { globalFromPlace, placeFromGlobal } from './geodesy';
+import { placeLabel, type Box } from './labels';
 import { extend, TRAIL_POINTS_MAX, type TrailPoint } from './trails';
 
 describe('geodesy', () => {
@@ -91,5 +92,17 @@ describe('what the map shows', () => {
     expect(scene.missions[0]?.state).toBe('selected');
     expect(scene.touchdowns).toHaveLength(1);
     expect(extent(scene)).toHaveLength(1);
+  });
+});
+
+describe('labels', () => {
+  it('take the first free side, and none where all are taken', () => {
+    const taken: Box[] = [];
+    const sides = [0, 1, 2, 3, 4].map(() => {
+      const box = placeLabel(100, 100, 10, 40, 20, taken);
+      if (box !== null) taken.push(box);
+      return box;
+    });
+    expect(sides.map((box) => box && [Math.sign(box.x + 20 - 100), Math.sign(box.y + 10 - 100)])).toEqual([[1, 0], [-1, 0], [0, 1], [0, -1], null]);
   });
 });
