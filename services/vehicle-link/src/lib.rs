@@ -1,1 +1,29 @@
-//! MAVLink to the autopilot: state, commands, guidance in formation, fail-safes
+//! MAVLink to the autopilot: state, commands, guidance in formation, fail-safes.
+//!
+//! Reads: dispatch plans, other vehicles' states, direct commands, the autopilot's MAVLink. Writes: this vehicle's state (10 Hz),
+//! events on every change of activity and every fail-safe, and MAVLink for exactly one autopilot. SI inside; positions in the
+//! fleet's local north-east-down frame; degrees and centimetres only in [`core::telemetry`] and [`core::encode`].
+//!
+//! | module | is |
+//! |---|---|
+//! | [`core::telemetry`] | MAVLink messages → vehicle state |
+//! | [`core::commands`] | the command protocol: retries, acknowledgements, typed refusals |
+//! | [`core::guidance`], [`core::separation`], [`core::track`] | the slot, the way there, the distance to everyone |
+//! | [`core::interlock`], [`core::failsafe`], [`core::control`] | when not to; the table of fail-safes; the pilot |
+//! | [`core::executor`] | reality made to match the newest plan or a direct command |
+//! | [`io::link`] | sockets and serial ports that come back |
+//! | [`actor`] | the one task |
+//!
+//! **Invariant:** nothing under `core/` knows the bus, a socket or a clock; messages and states go in, setpoints, requests and
+//! notes come out.
+//! **Invariant:** no message is addressed to MAVLink system 0, and none leaves before the autopilot's heartbeat but our own.
+//! **Invariant:** a mode that we didn't ask for is never changed back.
+
+pub mod actor;
+pub mod autopilot;
+pub mod config;
+pub mod core;
+pub mod io;
+
+pub use actor::run;
+pub use config::Config;

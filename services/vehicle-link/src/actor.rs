@@ -1,0 +1,246 @@
+//! The one task of the service: owns the executor and the autopilot's picture, waits for whatever comes next.
+//!
+//! Promises: telemetry, plans, neighbours and commands are taken in the order in which each comes; guidance ticks at its own
+//! rate, late ticks are skipped. When full, the bus's inboxes drop their oldest, the link its newest. A restart forgets direct
+//! commands and how long a fail-safe has lasted; the next plan brings the task back.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use anyhow::Context as _;
+use halcyon_chassis::{Context, EventDraft, Incoming, Publisher, topics};
+use halcyon_model::{CommandReply, Stamp, VehicleCommand, VehicleId, VehicleState};
+use tracing::{debug, info, trace, warn};
+
+use crate::autopilot::Autopilot;
+use crate::config::Config;
+use crate::core::commands::{Command, CommandError, Effect, Ticket};
+use crate::core::encode;
+use crate::core::executor::{Decision, Executor, ExecutorConfig, Output, PlanAnswer, word};
+use crate::io::link::{Link, LinkEvent};
+
+/// Commands that wait for the autopilot's answer at once; more are refused.
+const WAITING_MAX: usize = 16;
+
+/// Runs until `context.stop`.
+///
+/// # Errors
+/// If the bus session is gone.
+pub async fn run(context: Context, config: Config) -> anyhow::Result<()> {
+    let vehicle = VehicleId::new(&config.vehicle)?;
+    let mut plans = context.bus.subscribe(&topics::plan()).await?;
+    let mut others = context.bus.subscribe(&topics::vehicle_states()).await?;
+    let mut commands = context.bus.serve(&topics::vehicle_command(&vehicle)).await?;
+    let states = context.bus.publisher(&topics::vehicle_state(&vehicle)).await?;
+    let mut link = Link::start(config.endpoint.clone(), context.clock.clone(), context.stop.child_token());
+    let mut guidance = context.clock.every(Duration::from_secs_f64(1.0 / config.guidance_rate_hz));
+    let mut publishing = context.clock.every(Duration::from_secs_f64(1.0 / config.state_rate_hz));
+    let mut heartbeat = context.clock.every(Duration::from_secs(1));
+    let mut service = Service::new(&context, &config, vehicle, states)?;
+    info!(vehicle = config.vehicle, endpoint = config.endpoint, "vehicle link starts");
+    loop {
+        tokio::select! {
+            () = context.stop.cancelled() => return Ok(()),
+            event = link.recv() => service.observe_link(event.context("the link's task has ended")?, &link).await,
+            plan = plans.recv() => {
+                let answer = service.executor.observe_plan(&plan?, context.clock.now());
+                match answer {
+                    PlanAnswer::Accepted | PlanAnswer::Known => trace!(?answer, "plan"),
+                    PlanAnswer::RefusedOlder { .. } | PlanAnswer::RefusedInvalid(_) => debug!(?answer, "plan refused"),
+                }
+            }
+            state = others.recv() => service.executor.observe_neighbour(state?, context.clock.now()),
+            incoming = commands.recv() => service.command(incoming?).await,
+            now = guidance.tick() => service.step(now, &link).await,
+            now = publishing.tick() => service.publish(now).await?,
+            _ = heartbeat.tick() => link.send(service.autopilot.header(), encode::heartbeat()),
+        }
+    }
+}
+
+struct Service<'a> {
+    context: &'a Context,
+    vehicle: VehicleId,
+    executor: Executor,
+    autopilot: Autopilot,
+    states: Publisher<VehicleState>,
+    waiting: BTreeMap<Ticket, Incoming<VehicleCommand>>,
+    next_ticket: Ticket,
+    link_problem: Option<String>,
+    published: Option<Stamp>,
+}
+
+impl<'a> Service<'a> {
+    fn new(
+        context: &'a Context,
+        config: &Config,
+        vehicle: VehicleId,
+        states: Publisher<VehicleState>,
+    ) -> anyhow::Result<Self> {
+        let executor = Executor::new(ExecutorConfig {
+            vehicle: vehicle.clone(),
+            limits: config.limits.clone(),
+            fail_safe: config.fail_safe.clone(),
+            home_height_m: config.home_height_m,
+            frame: context.origin.frame(),
+        });
+        let autopilot = Autopilot::new(config, context.origin, context.clock.now())?;
+        let link_problem = Some(format!("connecting to {}", config.endpoint));
+        Ok(Self {
+            context,
+            vehicle,
+            executor,
+            autopilot,
+            states,
+            waiting: BTreeMap::new(),
+            next_ticket: 1,
+            link_problem,
+            published: None,
+        })
+    }
+
+    async fn observe_link(&mut self, event: LinkEvent, link: &Link) {
+        match event {
+            LinkEvent::Up => {
+                self.link_problem = Some("connected, waiting for the autopilot's heartbeat".into());
+                // Over UDP this is how the other end learns where we are.
+                link.send(self.autopilot.header(), encode::heartbeat());
+            }
+            LinkEvent::Down(why) => {
+                let was_found = self.autopilot.found();
+                let ended = self.autopilot.link_down();
+                self.carry_out(ended, link).await;
+                self.link_problem = Some(why.clone());
+                if was_found {
+                    self.event(EventDraft::warning("link to the autopilot lost", why)).await;
+                }
+            }
+            LinkEvent::Message(header, message) => {
+                let now = self.context.clock.now();
+                let heard = self.autopilot.observe(header, &message, now);
+                if let Some(system) = heard.found {
+                    self.link_problem = None;
+                    self.event(EventDraft::info("autopilot found", format!("MAVLink system {system}"))).await;
+                }
+                if let Some(text) = heard.text {
+                    info!(vehicle = %self.vehicle, "autopilot: {text}");
+                    self.executor.observe_text(&text, now);
+                }
+                if heard.state && let Some((state, mode_heard)) = self.autopilot.state(now) {
+                    self.executor.observe_self(state, mode_heard, now);
+                }
+            }
+        }
+    }
+
+    /// One guidance step, and whatever the command protocol has due.
+    async fn step(&mut self, now: Stamp, link: &Link) {
+        for output in self.executor.step(now) {
+            match output {
+                Output::Setpoint(setpoint) => {
+                    if let Some(message) = self.autopilot.setpoint(&setpoint, now) {
+                        link.send(self.autopilot.header(), message);
+                    }
+                }
+                Output::Request(command) => {
+                    if let Err(error) = self.autopilot.submit(0, command) {
+                        self.executor.observe_outcome(&command, &Err(error), now);
+                    }
+                }
+                Output::Withdraw => {
+                    let ended = self.autopilot.withdraw();
+                    self.carry_out(ended, link).await;
+                }
+                Output::Note(note) => self.event(EventDraft::new(note.severity, note.what, note.why)).await,
+            }
+        }
+        let effects = self.autopilot.poll(now);
+        self.carry_out(effects, link).await;
+        self.report();
+    }
+
+    async fn carry_out(&mut self, effects: Vec<Effect>, link: &Link) {
+        for effect in effects {
+            match effect {
+                Effect::Send(message) => link.send(self.autopilot.header(), message),
+                Effect::Done(_, Command::SetInterval(stream), outcome) => {
+                    if let Err(error) = outcome {
+                        debug!(message_id = stream.message_id, %error, "stream not set");
+                    }
+                }
+                Effect::Done(ticket, command, outcome) => {
+                    let now = self.context.clock.now();
+                    match self.waiting.remove(&ticket) {
+                        Some(incoming) => self.answer(incoming, &outcome, now).await,
+                        None => self.executor.observe_outcome(&command, &outcome, now),
+                    }
+                }
+            }
+        }
+    }
+
+    async fn answer(&self, incoming: Incoming<VehicleCommand>, outcome: &Result<(), CommandError>, now: Stamp) {
+        let reply = match outcome {
+            Ok(()) => CommandReply::accepted(now, "done by the autopilot"),
+            Err(error) => CommandReply::refused(now, error.to_string()),
+        };
+        incoming.reply(&reply).await;
+    }
+
+    async fn command(&mut self, incoming: Incoming<VehicleCommand>) {
+        let now = self.context.clock.now();
+        let reply = match self.executor.command(&incoming.command, now) {
+            Decision::Accepted(what) => CommandReply::accepted(now, what),
+            Decision::Refused(why) => {
+                warn!(vehicle = %self.vehicle, who = incoming.command.who, why, "command refused");
+                CommandReply::refused(now, why)
+            }
+            Decision::Ask(_) if self.waiting.len() >= WAITING_MAX => {
+                CommandReply::refused(now, CommandError::Busy.to_string())
+            }
+            Decision::Ask(command) => {
+                let ticket = self.next_ticket;
+                self.next_ticket += 1;
+                match self.autopilot.submit(ticket, command) {
+                    Ok(()) => {
+                        self.waiting.insert(ticket, incoming);
+                        return;
+                    }
+                    Err(error) => CommandReply::refused(now, error.to_string()),
+                }
+            }
+        };
+        incoming.reply(&reply).await;
+    }
+
+    /// Publishes the newest state; nothing new is said again once a second, with its old stamp, so that its age shows.
+    async fn publish(&mut self, now: Stamp) -> anyhow::Result<()> {
+        let Some((mut state, _)) = self.autopilot.state(now) else { return Ok(()) };
+        self.executor.complete(&mut state);
+        let silent_s = now.seconds_since(state.stamp);
+        let repeat = self.published.is_some_and(|published| now.seconds_since(published) < 1.0);
+        if silent_s > 1.0 && repeat {
+            return Ok(());
+        }
+        self.published = Some(now);
+        self.states.put(&state).await?;
+        Ok(())
+    }
+
+    fn report(&self) {
+        match (&self.link_problem, self.autopilot.missing()) {
+            (Some(problem), _) => self.context.health.degraded(problem.clone()),
+            (None, "") => {
+                let (activity, detail) = (word(self.executor.activity()), self.executor.detail());
+                // Running numbers would make a change of health of every step.
+                let shifting = detail.chars().any(|c| c.is_ascii_digit()) || detail.is_empty();
+                self.context.health.ready(if shifting { activity.to_owned() } else { format!("{activity}: {detail}") });
+            }
+            (None, missing) => self.context.health.degraded(missing),
+        }
+    }
+
+    async fn event(&self, draft: EventDraft) {
+        self.context.event(draft.vehicle(&self.vehicle)).await;
+    }
+}

@@ -1,0 +1,126 @@
+//! `[vehicle_link]`
+
+use halcyon_chassis::Section;
+use halcyon_model::{Role, VehicleId};
+use serde::{Deserialize, Serialize};
+
+use crate::core::limits::{FailSafeLimits, Limits};
+
+/// One vehicle and the link to its autopilot.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    /// The vehicle's identifier in the fleet.
+    pub vehicle: String,
+    /// `leader` (carries cameras) or `follower` (carries the payload).
+    pub role: String,
+    /// Where the autopilot is: `tcpout:host:port`, `tcpin:address:port`, `udpin:address:port`, `udpout:host:port`, or
+    /// `serial:device:baud`.
+    pub endpoint: String,
+    /// MAVLink system id of the autopilot; 0 takes the first autopilot heard on the link. Never used as an address.
+    pub system_id: u8,
+    /// Height of home, where the vehicle takes off, above mean water, metres.
+    pub home_height_m: f64,
+    /// Rate at which the vehicle's state is published, hertz.
+    pub state_rate_hz: f64,
+    /// Rate of guidance and setpoints, hertz.
+    pub guidance_rate_hz: f64,
+    /// Bounds of flight.
+    pub limits: Limits,
+    /// When fail-safes act.
+    pub fail_safe: FailSafeLimits,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            vehicle: "leader-1".into(),
+            role: "leader".into(),
+            endpoint: "tcpout:127.0.0.1:5760".into(),
+            system_id: 0,
+            home_height_m: 0.0,
+            state_rate_hz: 10.0,
+            guidance_rate_hz: 10.0,
+            limits: Limits::default(),
+            fail_safe: FailSafeLimits::default(),
+        }
+    }
+}
+
+impl Config {
+    /// The vehicle's role.
+    ///
+    /// # Errors
+    /// If it is neither `leader` nor `follower`.
+    pub fn role(&self) -> Result<Role, String> {
+        match self.role.as_str() {
+            "leader" => Ok(Role::Leader),
+            "follower" => Ok(Role::Follower),
+            other => Err(format!("role must be leader or follower, not {other:?}")),
+        }
+    }
+}
+
+impl Section for Config {
+    const NAME: &'static str = "vehicle_link";
+
+    fn validate(&self) -> Result<(), String> {
+        VehicleId::new(&self.vehicle).map_err(|error| format!("vehicle: {error}"))?;
+        self.role()?;
+        check_endpoint(&self.endpoint)?;
+        if !(-10.0..=1000.0).contains(&self.home_height_m) {
+            return Err(format!("home_height_m must be in -10 to 1000, not {}", self.home_height_m));
+        }
+        for (key, value) in [("state_rate_hz", self.state_rate_hz), ("guidance_rate_hz", self.guidance_rate_hz)] {
+            if !(1.0..=50.0).contains(&value) {
+                return Err(format!("{key} must be in 1 to 50, not {value}"));
+            }
+        }
+        self.limits.validate()?;
+        self.fail_safe.validate()?;
+        let (fence_m, safe_m) = (self.fail_safe.fence_height_m, self.limits.safe_height_m.max(self.limits.return_height_m));
+        if fence_m < safe_m + 2.0 {
+            return Err(format!("fail_safe.fence_height_m must be 2 m above the safe and return heights ({safe_m}), not {fence_m}"));
+        }
+        Ok(())
+    }
+}
+
+fn check_endpoint(endpoint: &str) -> Result<(), String> {
+    let problem = || {
+        Err(format!("endpoint must be tcpout:, tcpin:, udpin: or udpout:host:port, or serial:device:baud, not {endpoint:?}"))
+    };
+    let Some((scheme, rest)) = endpoint.split_once(':') else { return problem() };
+    let Some((place, number)) = rest.rsplit_once(':') else { return problem() };
+    let ok = !place.is_empty()
+        && match scheme {
+            "tcpout" | "udpout" => number.parse::<u16>().is_ok_and(|port| port != 0),
+            "tcpin" | "udpin" => number.parse::<u16>().is_ok(),
+            "serial" => number.parse::<u32>().is_ok_and(|baud| baud > 0),
+            _ => false,
+        };
+    if ok { Ok(()) } else { problem() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_defaults_are_valid_and_bad_values_are_one_clear_line() {
+        assert_eq!(Config::default().validate(), Ok(()));
+        let check = |config: Config, expected: &str| {
+            let problem = config.validate().unwrap_err();
+            assert!(problem.contains(expected) && !problem.contains('\n'), "{problem}");
+        };
+        for bad in ["", "tcpout", "tcpout:host", "tcpout:host:0", "udpin::1", "serial:/dev/x:fast", "file:x:1", "udpbcast:1:1"] {
+            check(Config { endpoint: bad.into(), ..Config::default() }, "endpoint must be");
+        }
+        for good in ["tcpout:[::1]:5760", "udpin:0.0.0.0:14550", "serial:/dev/ttyACM0:57600", "tcpin:127.0.0.1:0"] {
+            assert_eq!(Config { endpoint: good.into(), ..Config::default() }.validate(), Ok(()), "{good}");
+        }
+        check(Config { role: "boss".into(), ..Config::default() }, "role must be");
+        check(Config { vehicle: "a/b".into(), ..Config::default() }, "vehicle:");
+        check(Config { state_rate_hz: f64::NAN, ..Config::default() }, "state_rate_hz");
+    }
+}

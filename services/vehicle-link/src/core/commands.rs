@@ -1,0 +1,423 @@
+//! The command protocol: COMMAND_LONG and COMMAND_INT with confirmation count, acknowledgements matched by command id, retries,
+//! progress, timeouts, and a typed refusal with the autopilot's own words.
+//!
+//! An acknowledgement names its command and nothing else, so at most one transaction a command id is open; others wait in line.
+
+use std::collections::VecDeque;
+
+use halcyon_model::{FlightMode, Stamp};
+use mavlink::dialects::ardupilotmega as ardu;
+use mavlink::dialects::ardupilotmega::{MavCmd, MavMessage, MavResult};
+
+use super::encode::Address;
+use super::streams::Stream;
+use super::text::Texts;
+
+/// An answer is awaited for so long before the command is sent again, seconds.
+const RETRY_S: f64 = 1.0;
+/// Sent at most so many times.
+const TRIES: u8 = 4;
+/// After IN_PROGRESS: until the next word, and altogether, seconds.
+const PROGRESS_S: f64 = 5.0;
+const PROGRESS_S_MAX: f64 = 60.0;
+/// The words that explain a refusal may come just after it, seconds.
+const WORDS_S: f64 = 0.3;
+/// And just before it, seconds.
+const WORDS_AGE_S: f64 = 3.0;
+/// Open and waiting transactions; more are refused.
+const OPEN_MAX: usize = 32;
+
+/// What the autopilot can be asked to do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Command {
+    /// Start the motors.
+    Arm,
+    /// Stop them; `force` even in the air.
+    Disarm {
+        /// In the air or not.
+        force: bool,
+    },
+    /// Change the flight mode.
+    SetMode(FlightMode),
+    /// Climb from the ground to a height above home, metres.
+    TakeOff {
+        /// Height above home, metres.
+        height_above_home_m: f64,
+    },
+    /// Send a message at an interval.
+    SetInterval(Stream),
+}
+
+/// Who asked, to give the outcome back to; the caller's own number.
+pub type Ticket = u64;
+
+/// How a command ended.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum CommandError {
+    /// The autopilot said no.
+    #[error("the autopilot refused: {result}{}", .words.as_ref().map(|words| format!(" ({words})")).unwrap_or_default())]
+    Refused {
+        /// MAVLink's result, in words.
+        result: &'static str,
+        /// What the autopilot said about it, such as a PreArm message.
+        words: Option<String>,
+    },
+    /// It didn't answer.
+    #[error("the autopilot did not answer {tries} tries")]
+    TimedOut {
+        /// How often it was sent.
+        tries: u8,
+    },
+    /// Too many commands are under way.
+    #[error("{OPEN_MAX} commands are under way already")]
+    Busy,
+    /// The link went down before an answer.
+    #[error("the link to the autopilot was lost before it answered")]
+    LinkLost,
+    /// The pilot took over before it was answered.
+    #[error("withdrawn, since the pilot took over")]
+    Withdrawn,
+}
+
+/// What [`Commands::poll`] asks of its caller.
+#[derive(Debug, Clone)]
+pub enum Effect {
+    /// Send this.
+    Send(MavMessage),
+    /// A command ended.
+    Done(Ticket, Command, Result<(), CommandError>),
+}
+
+#[derive(Debug, Clone)]
+struct Transaction {
+    ticket: Ticket,
+    command: Command,
+    phase: Phase,
+    started: Option<Stamp>,
+    tries: u8,
+    as_int: bool,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Phase {
+    Waiting,
+    Sent { until: Stamp },
+    InProgress { until: Stamp },
+    /// Refused; waits for the words.
+    Refused { until: Stamp, result: &'static str },
+    Accepted,
+}
+
+/// All transactions with one autopilot.
+#[derive(Debug, Clone, Default)]
+pub struct Commands {
+    open: VecDeque<Transaction>,
+}
+
+impl Commands {
+    /// Puts a command in line.
+    ///
+    /// # Errors
+    /// [`CommandError::Busy`] when too many are under way.
+    pub fn submit(&mut self, ticket: Ticket, command: Command) -> Result<(), CommandError> {
+        if self.open.len() >= OPEN_MAX {
+            return Err(CommandError::Busy);
+        }
+        self.open.push_back(Transaction { ticket, command, phase: Phase::Waiting, started: None, tries: 0, as_int: false });
+        Ok(())
+    }
+
+    /// Takes an acknowledgement from the autopilot. `own_system` and `own_component` are ours: one addressed to another client
+    /// is not for us.
+    pub fn observe_ack(&mut self, ack: &ardu::COMMAND_ACK_DATA, own_system: u8, own_component: u8, now: Stamp) {
+        // Old firmware leaves the address empty.
+        let for_us = (ack.target_system == 0 && ack.target_component == 0)
+            || (ack.target_system == own_system && (ack.target_component == own_component || ack.target_component == 0));
+        if !for_us {
+            return;
+        }
+        let waiting = |open: &&mut Transaction| {
+            open.command.id() == ack.command && matches!(open.phase, Phase::Sent { .. } | Phase::InProgress { .. })
+        };
+        let Some(open) = self.open.iter_mut().find(waiting) else { return };
+        open.phase = match ack.result {
+            MavResult::MAV_RESULT_ACCEPTED => Phase::Accepted,
+            MavResult::MAV_RESULT_IN_PROGRESS => Phase::InProgress { until: now.plus_secs_f64(PROGRESS_S) },
+            MavResult::MAV_RESULT_COMMAND_INT_ONLY if !open.as_int => {
+                open.as_int = true;
+                Phase::Sent { until: now }
+            }
+            refused => Phase::Refused { until: now.plus_secs_f64(WORDS_S), result: words(refused) },
+        };
+    }
+
+    /// Sends what is due, ends what has ended.
+    pub fn poll(&mut self, to: Address, texts: &Texts, now: Stamp) -> Vec<Effect> {
+        let mut effects = Vec::new();
+        let mut busy: Vec<MavCmd> = Vec::new();
+        self.open.retain_mut(|open| {
+            let id = open.command.id();
+            if busy.contains(&id) {
+                return true;
+            }
+            busy.push(id);
+            let keep = open.step(to, texts, now, &mut effects);
+            if !keep {
+                busy.pop();
+            }
+            keep
+        });
+        effects
+    }
+
+    /// Stops sending whatever would change mode or motors: the pilot took over.
+    pub fn withdraw(&mut self) -> Vec<Effect> {
+        let mut ended = Vec::new();
+        self.open.retain(|open| {
+            let keep = matches!(open.command, Command::SetInterval(_));
+            if !keep {
+                ended.push(Effect::Done(open.ticket, open.command, Err(CommandError::Withdrawn)));
+            }
+            keep
+        });
+        ended
+    }
+
+    /// The link is down: nothing that was under way has an outcome.
+    pub fn abandon(&mut self) -> Vec<Effect> {
+        self.open.drain(..).map(|open| Effect::Done(open.ticket, open.command, Err(CommandError::LinkLost))).collect()
+    }
+}
+
+impl Transaction {
+    /// Whether the transaction goes on.
+    fn step(&mut self, to: Address, texts: &Texts, now: Stamp, effects: &mut Vec<Effect>) -> bool {
+        let outcome = match self.phase {
+            Phase::Accepted => Ok(()),
+            Phase::Refused { until, .. } if now < until => return true,
+            Phase::Refused { result, .. } => Err(CommandError::Refused { result, words: self.explanation(texts, now) }),
+            _ if self.started.is_some_and(|started| now.seconds_since(started) > PROGRESS_S_MAX) => {
+                Err(CommandError::TimedOut { tries: self.tries })
+            }
+            Phase::Sent { until } | Phase::InProgress { until } if now < until => return true,
+            _ if self.tries >= TRIES => Err(CommandError::TimedOut { tries: self.tries }),
+            Phase::Waiting | Phase::Sent { .. } | Phase::InProgress { .. } => {
+                effects.push(Effect::Send(self.command.message(to, self.tries, self.as_int)));
+                self.tries += 1;
+                self.started.get_or_insert(now);
+                self.phase = Phase::Sent { until: now.plus_secs_f64(RETRY_S) };
+                return true;
+            }
+        };
+        effects.push(Effect::Done(self.ticket, self.command, outcome));
+        false
+    }
+
+    fn explanation(&self, texts: &Texts, now: Stamp) -> Option<String> {
+        let arming = matches!(self.command, Command::Arm | Command::TakeOff { .. });
+        if arming && let Some(complaint) = texts.arming_complaint(now, 60.0) {
+            return Some(complaint.to_owned());
+        }
+        // Severity 4 is a warning; beyond that it's chatter.
+        texts.newest(now, WORDS_AGE_S, |text| text.severity <= 4).map(|text| text.text.clone())
+    }
+}
+
+impl Command {
+    /// MAVLink's number for it.
+    #[must_use]
+    pub fn id(&self) -> MavCmd {
+        match self {
+            Self::Arm | Self::Disarm { .. } => MavCmd::MAV_CMD_COMPONENT_ARM_DISARM,
+            Self::SetMode(_) => MavCmd::MAV_CMD_DO_SET_MODE,
+            Self::TakeOff { .. } => MavCmd::MAV_CMD_NAV_TAKEOFF,
+            Self::SetInterval(_) => MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL,
+        }
+    }
+
+    /// The seven parameters.
+    fn parameters(&self) -> [f32; 7] {
+        /// ArduPilot's and PX4's word for "even in the air".
+        const FORCE: f32 = 21196.0;
+        match *self {
+            Self::Arm => [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            Self::Disarm { force } => [0.0, if force { FORCE } else { 0.0 }, 0.0, 0.0, 0.0, 0.0, 0.0],
+            // 1: MAV_MODE_FLAG_CUSTOM_MODE_ENABLED.
+            Self::SetMode(mode) => [1.0, mode.copter_number() as f32, 0.0, 0.0, 0.0, 0.0, 0.0],
+            Self::TakeOff { height_above_home_m } => [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, height_above_home_m as f32],
+            Self::SetInterval(stream) => [stream.message_id as f32, stream.interval_us as f32, 0.0, 0.0, 0.0, 0.0, 0.0],
+        }
+    }
+
+    fn message(&self, to: Address, confirmation: u8, as_int: bool) -> MavMessage {
+        let [param1, param2, param3, param4, param5, param6, param7] = self.parameters();
+        let (command, target_system, target_component) = (self.id(), to.system(), to.component());
+        if as_int {
+            return MavMessage::COMMAND_INT(ardu::COMMAND_INT_DATA {
+                param1,
+                param2,
+                param3,
+                param4,
+                x: param5 as i32,
+                y: param6 as i32,
+                z: param7,
+                command,
+                target_system,
+                target_component,
+                frame: ardu::MavFrame::MAV_FRAME_GLOBAL_RELATIVE_ALT,
+                current: 0,
+                autocontinue: 0,
+            });
+        }
+        MavMessage::COMMAND_LONG(ardu::COMMAND_LONG_DATA {
+            param1,
+            param2,
+            param3,
+            param4,
+            param5,
+            param6,
+            param7,
+            command,
+            target_system,
+            target_component,
+            confirmation,
+        })
+    }
+}
+
+fn words(result: MavResult) -> &'static str {
+    match result {
+        MavResult::MAV_RESULT_ACCEPTED => "accepted",
+        MavResult::MAV_RESULT_TEMPORARILY_REJECTED => "temporarily rejected",
+        MavResult::MAV_RESULT_DENIED => "denied",
+        MavResult::MAV_RESULT_UNSUPPORTED => "unsupported",
+        MavResult::MAV_RESULT_FAILED => "failed",
+        MavResult::MAV_RESULT_IN_PROGRESS => "in progress",
+        MavResult::MAV_RESULT_CANCELLED => "cancelled",
+        MavResult::MAV_RESULT_COMMAND_LONG_ONLY | MavResult::MAV_RESULT_COMMAND_INT_ONLY => "wrong form of command",
+        MavResult::MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME => "unsupported frame",
+        MavResult::MAV_RESULT_NOT_IN_CONTROL => "not in control",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const OWN: (u8, u8) = (7, 191);
+
+    fn t(s: f64) -> Stamp {
+        Stamp::from_secs_f64(1000.0).plus_secs_f64(s)
+    }
+
+    fn to() -> Address {
+        Address::new(7, 1).unwrap()
+    }
+
+    fn ack(command: MavCmd, result: MavResult, target: (u8, u8)) -> ardu::COMMAND_ACK_DATA {
+        ardu::COMMAND_ACK_DATA { command, result, target_system: target.0, target_component: target.1, ..Default::default() }
+    }
+
+    fn confirmations(effects: &[Effect]) -> Vec<u8> {
+        let confirmation = |effect: &Effect| match effect {
+            Effect::Send(MavMessage::COMMAND_LONG(data)) => Some(data.confirmation),
+            _ => None,
+        };
+        effects.iter().filter_map(confirmation).collect()
+    }
+
+    #[test]
+    fn retried_with_confirmation_count_then_timed_out() {
+        let mut commands = Commands::default();
+        commands.submit(1, Command::Arm).unwrap();
+        let mut seen = Vec::new();
+        let mut outcome = None;
+        for step in 0..100 {
+            let effects = commands.poll(to(), &Texts::default(), t(f64::from(step) * 0.1));
+            seen.extend(confirmations(&effects));
+            outcome = outcome.or(effects.into_iter().find_map(|effect| match effect {
+                Effect::Done(1, Command::Arm, outcome) => Some((step, outcome)),
+                _ => None,
+            }));
+        }
+        assert_eq!(seen, [0, 1, 2, 3]);
+        assert_eq!(outcome, Some((40, Err(CommandError::TimedOut { tries: 4 }))));
+    }
+
+    #[test]
+    fn only_our_acknowledgement_of_this_command_counts() {
+        let mut commands = Commands::default();
+        commands.submit(1, Command::Arm).unwrap();
+        commands.poll(to(), &Texts::default(), t(0.0));
+        let arm = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM;
+        commands.observe_ack(&ack(MavCmd::MAV_CMD_NAV_TAKEOFF, MavResult::MAV_RESULT_ACCEPTED, OWN), OWN.0, OWN.1, t(0.1));
+        commands.observe_ack(&ack(arm, MavResult::MAV_RESULT_ACCEPTED, (255, 190)), OWN.0, OWN.1, t(0.1));
+        assert!(commands.poll(to(), &Texts::default(), t(0.2)).is_empty());
+        commands.observe_ack(&ack(arm, MavResult::MAV_RESULT_ACCEPTED, OWN), OWN.0, OWN.1, t(0.3));
+        assert!(matches!(commands.poll(to(), &Texts::default(), t(0.3))[..], [Effect::Done(1, Command::Arm, Ok(()))]));
+    }
+
+    #[test]
+    fn a_refusal_carries_the_autopilots_words_even_if_they_come_after_it() {
+        let mut commands = Commands::default();
+        let mut texts = Texts::default();
+        commands.submit(9, Command::Arm).unwrap();
+        commands.poll(to(), &texts, t(0.0));
+        let refused = ack(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, MavResult::MAV_RESULT_FAILED, OWN);
+        commands.observe_ack(&refused, OWN.0, OWN.1, t(0.1));
+        assert!(commands.poll(to(), &texts, t(0.15)).is_empty());
+        let text = ardu::STATUSTEXT_DATA {
+            severity: ardu::MavSeverity::MAV_SEVERITY_CRITICAL,
+            text: "PreArm: Need Position Estimate".into(),
+            ..Default::default()
+        };
+        texts.observe(&text, t(0.2));
+        let effects = commands.poll(to(), &texts, t(0.5));
+        let [Effect::Done(9, _, Err(error))] = &effects[..] else { panic!("{effects:?}") };
+        assert_eq!(error.to_string(), "the autopilot refused: failed (PreArm: Need Position Estimate)");
+    }
+
+    #[test]
+    fn progress_extends_the_wait_but_not_for_ever_and_int_only_is_sent_as_int() {
+        let mut commands = Commands::default();
+        let takeoff = Command::TakeOff { height_above_home_m: 5.0 };
+        commands.submit(1, takeoff).unwrap();
+        commands.poll(to(), &Texts::default(), t(0.0));
+        let id = MavCmd::MAV_CMD_NAV_TAKEOFF;
+        commands.observe_ack(&ack(id, MavResult::MAV_RESULT_COMMAND_INT_ONLY, OWN), OWN.0, OWN.1, t(0.1));
+        let effects = commands.poll(to(), &Texts::default(), t(0.1));
+        let [Effect::Send(MavMessage::COMMAND_INT(data))] = &effects[..] else { panic!("{effects:?}") };
+        assert_eq!((data.z, data.target_system, data.target_component), (5.0, 7, 1));
+        let mut ended = None;
+        for step in 2..2000 {
+            let now = t(f64::from(step) * 0.1);
+            commands.observe_ack(&ack(id, MavResult::MAV_RESULT_IN_PROGRESS, OWN), OWN.0, OWN.1, now);
+            for effect in commands.poll(to(), &Texts::default(), now) {
+                if let Effect::Done(_, _, outcome) = effect {
+                    ended = Some((step, outcome));
+                }
+            }
+            if ended.is_some() {
+                break;
+            }
+        }
+        assert!(matches!(ended, Some((599..=602, Err(CommandError::TimedOut { .. })))), "{ended:?}");
+    }
+
+    #[test]
+    fn one_command_id_at_a_time_and_a_bounded_line() {
+        let mut commands = Commands::default();
+        commands.submit(1, Command::SetMode(FlightMode::Guided)).unwrap();
+        commands.submit(2, Command::SetMode(FlightMode::Land)).unwrap();
+        commands.submit(3, Command::Arm).unwrap();
+        assert_eq!(commands.poll(to(), &Texts::default(), t(0.0)).len(), 2);
+        let mode = ack(MavCmd::MAV_CMD_DO_SET_MODE, MavResult::MAV_RESULT_ACCEPTED, OWN);
+        commands.observe_ack(&mode, OWN.0, OWN.1, t(0.1));
+        let effects = commands.poll(to(), &Texts::default(), t(0.1));
+        assert!(matches!(effects[..], [Effect::Done(1, _, Ok(())), Effect::Send(_)]), "{effects:?}");
+        while commands.submit(4, Command::Arm).is_ok() {}
+        assert_eq!(commands.submit(4, Command::Arm), Err(CommandError::Busy));
+        let ended = commands.abandon();
+        assert_eq!(ended.len(), OPEN_MAX);
+    }
+}

@@ -1,0 +1,176 @@
+//! Who has the vehicle: Halcyon or the pilot. The pilot always wins: a mode that we didn't ask for is never fought, and Halcyon
+//! takes the vehicle back only when it is handed back, by GUIDED.
+
+use halcyon_model::{FlightMode, Stamp};
+
+/// A mode that we asked for is ours if it comes within this time, seconds.
+const EXPECT_S: f64 = 8.0;
+
+/// What a new observation changed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Change {
+    /// Nothing about who has it.
+    None,
+    /// The pilot, or the autopilot's own fail-safe, took it.
+    TakenOver,
+    /// It was handed back.
+    HandedBack,
+}
+
+/// Follows the flight mode.
+#[derive(Debug, Clone, Default)]
+pub struct Control {
+    last: Option<(FlightMode, bool)>,
+    expected: Option<(FlightMode, Stamp)>,
+    ours: Option<FlightMode>,
+    hands_off: bool,
+    since_start: bool,
+}
+
+impl Control {
+    /// We are about to ask for a mode.
+    pub fn expect(&mut self, mode: FlightMode, now: Stamp) {
+        self.expected = Some((mode, now));
+    }
+
+    /// Whether Halcyon must keep its hands off.
+    #[must_use]
+    pub fn hands_off(&self) -> bool {
+        self.hands_off
+    }
+
+    /// Whether the hands have been off since the first thing that was heard: then the mode may be what our predecessor, before a
+    /// restart, had asked for.
+    #[must_use]
+    pub fn may_adopt(&self) -> bool {
+        self.hands_off && self.since_start
+    }
+
+    /// Takes the present mode as our own.
+    pub fn adopt(&mut self) {
+        self.ours = self.last.map(|last| last.0);
+        self.hands_off = false;
+    }
+
+    /// A person asked us, in so many words, to take the vehicle back.
+    pub fn reclaim(&mut self) {
+        self.hands_off = false;
+    }
+
+    /// Takes the observed mode.
+    pub fn observe(&mut self, mode: FlightMode, armed: bool, now: Stamp) -> Change {
+        let before = self.hands_off;
+        let first = self.last.is_none();
+        let changed = self.last.is_some_and(|last| last.0 != mode);
+        let disarmed = self.last.is_some_and(|last| last.1) && !armed;
+        self.last = Some((mode, armed));
+        self.expected = self.expected.filter(|(_, at)| now.seconds_since(*at) <= EXPECT_S);
+        if first {
+            self.hands_off = armed && mode != FlightMode::Guided;
+            self.since_start = true;
+        } else if self.expected.is_some_and(|(expected, _)| expected == mode) {
+            self.ours = Some(mode);
+            self.expected = None;
+            self.hands_off = false;
+        } else if mode == FlightMode::Guided {
+            // Whoever set it: this is how the vehicle is handed back.
+            self.hands_off = false;
+        } else if changed {
+            // On the ground too, once we had set a mode: setting it again would be a fight.
+            self.hands_off = armed || self.ours.is_some();
+            self.ours = None;
+            self.expected = None;
+        } else if armed && self.ours != Some(mode) && self.expected.is_none() {
+            // Armed by someone in a mode that isn't ours.
+            self.hands_off = true;
+        } else if disarmed {
+            // The flight is over; so is whoever's turn it was.
+            self.hands_off = false;
+            self.ours = None;
+        }
+        if changed && !first {
+            self.since_start = false;
+        }
+        match (before, self.hands_off) {
+            (false, true) => Change::TakenOver,
+            (true, false) => Change::HandedBack,
+            _ => Change::None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use FlightMode::{Guided, Land, Loiter, Rtl, Stabilize};
+
+    fn t(s: f64) -> Stamp {
+        Stamp::from_secs_f64(1000.0).plus_secs_f64(s)
+    }
+
+    #[test]
+    fn a_mode_we_asked_for_is_ours_and_another_is_the_pilots() {
+        let mut control = Control::default();
+        assert_eq!(control.observe(Stabilize, false, t(0.0)), Change::None);
+        control.expect(Guided, t(0.0));
+        control.observe(Guided, false, t(0.2));
+        control.observe(Guided, true, t(1.0));
+        assert!(!control.hands_off());
+        control.expect(Land, t(2.0));
+        assert_eq!(control.observe(Land, true, t(2.2)), Change::None);
+        assert!(!control.hands_off());
+        assert_eq!(control.observe(Loiter, true, t(3.0)), Change::TakenOver);
+        // Our LAND, asked for earlier, doesn't make a LAND by the pilot ours.
+        control.observe(Land, true, t(4.0));
+        assert!(control.hands_off());
+        assert_eq!(control.observe(Guided, true, t(5.0)), Change::HandedBack);
+    }
+
+    #[test]
+    fn a_late_or_crossed_request_does_not_excuse_another_mode() {
+        let mut control = Control::default();
+        control.observe(Guided, true, t(0.0));
+        control.expect(Land, t(0.0));
+        assert_eq!(control.observe(Loiter, true, t(0.1)), Change::TakenOver);
+        control.observe(Land, true, t(0.3));
+        assert!(control.hands_off(), "the pilot came first");
+        let mut control = Control::default();
+        control.observe(Guided, true, t(0.0));
+        control.expect(Land, t(0.0));
+        control.observe(Guided, true, t(9.0));
+        assert_eq!(control.observe(Land, true, t(9.1)), Change::TakenOver, "too late to be ours");
+    }
+
+    #[test]
+    fn on_the_ground_the_first_mode_is_nobodys_but_ours_is_not_set_twice() {
+        let mut control = Control::default();
+        control.observe(Stabilize, false, t(0.0));
+        assert_eq!(control.observe(Loiter, false, t(1.0)), Change::None);
+        control.expect(Guided, t(1.0));
+        control.observe(Guided, false, t(1.2));
+        assert_eq!(control.observe(Loiter, false, t(2.0)), Change::TakenOver);
+        control.reclaim();
+        assert!(!control.hands_off());
+    }
+
+    #[test]
+    fn armed_in_another_mode_is_the_pilots_flight_and_ends_with_it() {
+        let mut control = Control::default();
+        control.observe(Loiter, false, t(0.0));
+        assert_eq!(control.observe(Loiter, true, t(1.0)), Change::TakenOver);
+        assert_eq!(control.observe(Loiter, false, t(60.0)), Change::HandedBack);
+    }
+
+    #[test]
+    fn after_a_restart_in_flight_a_landing_may_be_adopted_until_something_changes() {
+        let mut control = Control::default();
+        control.observe(Rtl, true, t(0.0));
+        assert!(control.hands_off() && control.may_adopt());
+        let mut other = control.clone();
+        control.adopt();
+        control.observe(Rtl, true, t(0.2));
+        assert!(!control.hands_off());
+        other.observe(Loiter, true, t(0.2));
+        assert!(other.hands_off() && !other.may_adopt());
+    }
+}

@@ -1,0 +1,250 @@
+//! In the air: fail-safes first, then the goal, then one setpoint through the separation filter.
+
+use halcyon_model::{Activity, FlightMode, LocalPoint, Slot, Stamp, VehicleId, VehicleState};
+use nalgebra::Vector3;
+
+use super::{Executor, Goal, Output};
+use crate::core::commands::Command;
+use crate::core::failsafe::{Action, Alarm, Cause, Conditions, PlanHealth};
+use crate::core::guidance::{Reference, Setpoint, Target, limit_velocity, slot_motion};
+use crate::core::interlock;
+use crate::core::separation;
+
+/// The autopilot's own climb is waited for so long, seconds; then guidance takes over.
+const CLIMB_S_MAX: f64 = 30.0;
+/// Nearer than this to its place a vehicle may go to the place's own height, and counts as there, metres.
+const NEAR_M: f64 = 3.0;
+/// Lower than the floor by more than this, a vehicle climbs before it goes anywhere, metres.
+const LOW_M: f64 = 0.7;
+/// Setpoints end this far inside the fence, metres.
+const FENCE_INSIDE_M: f64 = 2.0;
+
+/// One step's circumstances.
+pub(super) struct Step<'a> {
+    pub(super) own: &'a VehicleState,
+    /// Own position at `now`, metres.
+    pub(super) here_ned_m: Vector3<f64>,
+    pub(super) dt_s: f64,
+    pub(super) now: Stamp,
+    pub(super) outputs: &'a mut Vec<Output>,
+}
+
+impl Step<'_> {
+    pub(super) fn height_m(&self) -> f64 {
+        -self.here_ned_m.z
+    }
+
+    pub(super) fn distance_m(&self, point: LocalPoint) -> f64 {
+        LocalPoint::from(self.here_ned_m).distance_m(&point)
+    }
+}
+
+/// A place at a height above mean water.
+pub(super) fn at(point: LocalPoint, height_m: f64) -> Vector3<f64> {
+    Vector3::new(point.north_m, point.east_m, -height_m)
+}
+
+impl Executor {
+    /// One step in the air, with the vehicle ours.
+    pub(super) fn fly(&mut self, own: &VehicleState, goal: Option<Goal>, dt_s: f64, now: Stamp, outputs: &mut Vec<Output>) {
+        let goal = match goal {
+            Some(goal) => goal,
+            None if self.plan_health(now) == PlanHealth::Lapsed => Goal::Stay,
+            None if self.restarted_at.is_some() => {
+                return self.set(Activity::Holding { settled: false }, "restarted in flight, waiting for a plan");
+            }
+            None => return self.set(Activity::Idle, "in the air, but not by us"),
+        };
+        self.flown = Some(goal.clone());
+        let alarm = self.alarm(own, &goal, now);
+        let age_s = now.seconds_since(own.stamp).clamp(0.0, 0.5);
+        let here_ned_m = own.position_ned_m + own.velocity_ned_mps * age_s;
+        let land_now = alarm.as_ref().is_some_and(|alarm| alarm.action == Action::Land);
+        if let Some(climb) = self.climb.filter(|_| own.mode == FlightMode::Guided && !land_now) {
+            if -here_ned_m.z < climb.height_m - 0.5 && now.seconds_since(climb.since) < CLIMB_S_MAX {
+                // A setpoint now would end the autopilot's own take-off.
+                return self.set(Activity::TakingOff, format!("to {:.1} m", climb.height_m));
+            }
+        }
+        self.climb = None;
+        let effective = match alarm.as_ref().map(|alarm| alarm.action) {
+            None => goal,
+            Some(Action::Hold) => Goal::Stay,
+            Some(Action::Return) => Goal::Return,
+            Some(Action::Land) => Goal::LandHere,
+        };
+        if !self.flying.as_ref().is_some_and(|flying| flying.is_same_as(&effective)) {
+            self.settle.reset();
+            self.descending = false;
+            self.held = None;
+        }
+        self.flying = Some(effective.clone());
+        let mut step = Step { own, here_ned_m, dt_s, now, outputs };
+        match own.mode {
+            FlightMode::Guided => self.guide(&effective, &mut step),
+            FlightMode::Land => self.in_land_mode(&effective, &mut step),
+            // Ours only on the way home without a known home.
+            _ if effective == Goal::Return => self.set(Activity::Returning, "by the autopilot's own RTL"),
+            _ => self.request(Command::SetMode(FlightMode::Guided), now, step.outputs),
+        }
+        if let Some(alarm) = alarm {
+            self.activity = Activity::FailSafe { reason: alarm.reason };
+        }
+    }
+
+    /// The fail-safe in charge, those of a landing included.
+    fn alarm(&mut self, own: &VehicleState, goal: &Goal, now: Stamp) -> Option<Alarm> {
+        let follow = match goal {
+            Goal::Follow { leader, .. } => {
+                let track = self.neighbours.get(leader);
+                Some(interlock::may_follow(leader, track, &self.config.limits, &self.config.fail_safe, now))
+            }
+            _ => None,
+        };
+        let homeward = matches!(goal, Goal::Return | Goal::LandHere);
+        let conditions = Conditions { own, plan: self.plan_health(now), follow, homeward };
+        let alarm = self.fail_safes.step(&conditions, &self.config.fail_safe, now);
+        if let Goal::Land { clearance, .. } = goal {
+            if super::descent::clearance_problem(clearance.as_ref(), now).is_none() {
+                self.uncleared = None;
+            }
+            let waited_s = self.uncleared.map_or(0.0, |since| now.seconds_since(since));
+            if alarm.is_none() && waited_s > self.config.fail_safe.clearance_wait_s {
+                let reason = format!("no clearance to land for {:.0} s", self.config.fail_safe.clearance_wait_s);
+                return Some(Alarm { cause: Cause::Clearance, action: Action::Return, reason });
+            }
+        }
+        alarm
+    }
+
+    /// Guidance in GUIDED.
+    fn guide(&mut self, goal: &Goal, step: &mut Step) {
+        match goal {
+            Goal::Stay => {
+                let settled = self.hold(None, step);
+                self.set(Activity::Holding { settled }, "");
+            }
+            Goal::Go { point, height_m, heading_rad } => self.go(*point, *height_m, *heading_rad, step),
+            Goal::Follow { leader, slot } => self.follow(leader, slot, step),
+            Goal::Land { point, approach_height_m, clearance } => {
+                self.land(*point, *approach_height_m, clearance.as_ref(), step);
+            }
+            Goal::LandHere => {
+                self.request(Command::SetMode(FlightMode::Land), step.now, step.outputs);
+                self.set(Activity::Descending, "landing here");
+            }
+            Goal::Return => self.go_home(step),
+        }
+    }
+
+    /// Stops and holds; returns whether settled. Below the safe height it climbs to it.
+    pub(super) fn hold(&mut self, heading_rad: Option<f64>, step: &mut Step) -> bool {
+        let limits = &self.config.limits;
+        let here_ned_m = step.here_ned_m;
+        let held = *self.held.get_or_insert_with(|| {
+            // Where it comes to a stop, so that it doesn't fly back.
+            let velocity = step.own.velocity_ned_mps;
+            let speed_mps = velocity.xy().norm().min(limits.speed_mps_max);
+            let stop_s = speed_mps / (1.4 * limits.acceleration_mps2);
+            let height_m = (-here_ned_m.z).max(limits.safe_height_m);
+            Vector3::new(here_ned_m.x + velocity.x * stop_s, here_ned_m.y + velocity.y * stop_s, -height_m)
+        });
+        let floor_m = limits.safe_height_m;
+        let (radius_m, settle_s) = (limits.settle_radius_m, limits.settle_s);
+        self.drive(held, Vector3::zeros(), heading_rad, floor_m, step);
+        self.settle.step((held - here_ned_m).norm(), radius_m, settle_s, step.now)
+    }
+
+    fn go(&mut self, point: LocalPoint, height_m: f64, heading_rad: Option<f64>, step: &mut Step) {
+        let limits = &self.config.limits;
+        let near = step.distance_m(point) <= NEAR_M;
+        // The way there is flown at the safe height or above; only the place itself may be lower.
+        let floor_m = if near { limits.safe_height_m.min(height_m) } else { limits.safe_height_m };
+        let place = at(point, height_m.max(floor_m));
+        let (radius_m, settle_s) = (limits.settle_radius_m, limits.settle_s);
+        self.drive(place, Vector3::zeros(), heading_rad, floor_m, step);
+        let error_m = (at(point, height_m) - step.here_ned_m).norm();
+        let settled = self.settle.step(error_m, radius_m, settle_s, step.now);
+        if near && error_m <= NEAR_M {
+            self.set(Activity::Holding { settled }, "");
+        } else {
+            self.set(Activity::Transit, format!("{error_m:.0} m to go"));
+        }
+    }
+
+    fn follow(&mut self, leader: &VehicleId, slot: &Slot, step: &mut Step) {
+        let Some(track) = self.neighbours.get(leader) else {
+            // The interlock has refused this already; hold all the same.
+            self.hold(None, step);
+            return self.set(Activity::Following { settled: false, slot_error_m: f64::MAX }, "leader unknown");
+        };
+        let limits = &self.config.limits;
+        let present = slot_motion(&track.predict(step.now, 0.0), slot);
+        let ahead = slot_motion(&track.predict(step.now, limits.latency_s), slot);
+        let silent_s = track.silent_s(step.now);
+        let (floor_m, radius_m, settle_s) = (limits.safe_height_m, limits.settle_radius_m, limits.settle_s);
+        let above_floor = |place: Vector3<f64>| Vector3::new(place.x, place.y, place.z.min(-floor_m));
+        let slot_error_m = (above_floor(present.position_ned_m) - step.here_ned_m).norm();
+        if silent_s > self.config.fail_safe.leader_predict_s {
+            self.hold(None, step);
+            self.settle.reset();
+            let detail = format!("leader silent for {silent_s:.1} s, holding");
+            return self.set(Activity::Following { settled: false, slot_error_m }, detail);
+        }
+        self.held = None;
+        // The thesis's second condition: the same heading as the leader's.
+        self.drive(above_floor(ahead.position_ned_m), ahead.velocity_ned_mps, Some(ahead.heading_rad), floor_m, step);
+        let settled = self.settle.step(slot_error_m, radius_m, settle_s, step.now);
+        self.set(Activity::Following { settled, slot_error_m }, "");
+    }
+
+    /// Moves the reference towards a place and sends it: never below `floor_m`, never outside the fence, never too near to
+    /// anyone. Low, it climbs before it goes sideways.
+    pub(super) fn drive(
+        &mut self,
+        place_ned_m: Vector3<f64>,
+        velocity_ned_mps: Vector3<f64>,
+        heading_rad: Option<f64>,
+        floor_m: f64,
+        step: &mut Step,
+    ) {
+        let limits = &self.config.limits;
+        let start = Reference { position_ned_m: step.here_ned_m, velocity_ned_mps: step.own.velocity_ned_mps };
+        let mut reference = self.reference.unwrap_or(start);
+        let mut target =
+            Target { position_ned_m: place_ned_m, velocity_ned_mps, descent_mps: limits.descent_mps };
+        if step.height_m() < floor_m - LOW_M {
+            target.position_ned_m = Vector3::new(reference.position_ned_m.x, reference.position_ned_m.y, place_ned_m.z);
+            target.velocity_ned_mps = Vector3::zeros();
+        }
+        let wanted = reference.wanted_mps(&target, limits, step.dt_s);
+        let obstacles: Vec<_> =
+            self.neighbours.values().filter_map(|track| separation::obstacle(track, limits, step.now)).collect();
+        let points = [step.here_ned_m, reference.position_ned_m];
+        let mut velocity = separation::filter(wanted, points, target.position_ned_m, &obstacles, limits);
+        limit_velocity(&mut velocity, limits, limits.descent_mps);
+        reference.advance(velocity, step.here_ned_m, step.dt_s);
+
+        if reference.position_ned_m.z > -floor_m {
+            reference.position_ned_m.z = -floor_m;
+            let climbing = step.height_m() < floor_m - 0.3;
+            reference.velocity_ned_mps.z = if climbing { -limits.climb_mps } else { reference.velocity_ned_mps.z.min(0.0) };
+        }
+        let ceiling_m = self.config.fail_safe.fence_height_m - FENCE_INSIDE_M;
+        if reference.position_ned_m.z < -ceiling_m {
+            reference.position_ned_m.z = -ceiling_m;
+            reference.velocity_ned_mps.z = 0.0;
+        }
+        let radius_m = self.config.fail_safe.fence_radius_m - FENCE_INSIDE_M;
+        let out_m = reference.position_ned_m.xy().norm();
+        if out_m > radius_m {
+            reference.position_ned_m.x *= radius_m / out_m;
+            reference.position_ned_m.y *= radius_m / out_m;
+            reference.velocity_ned_mps.x = 0.0;
+            reference.velocity_ned_mps.y = 0.0;
+        }
+        self.reference = Some(reference);
+        let Reference { position_ned_m, velocity_ned_mps } = reference;
+        step.outputs.push(Output::Setpoint(Setpoint { position_ned_m, velocity_ned_mps, heading_rad }));
+    }
+}

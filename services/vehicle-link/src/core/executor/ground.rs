@@ -1,0 +1,116 @@
+//! On the ground: waiting, arming, taking off; and what counts as landed.
+
+use halcyon_model::{Activity, FlightMode, LandedState, LocalPoint, Stamp, VehicleState};
+
+use super::{Climb, Executor, Goal, Output};
+use crate::core::commands::Command;
+use crate::core::failsafe::{FailSafes, PlanHealth};
+use crate::core::interlock;
+
+/// A vehicle on the ground with a task to land counts as landed within this distance of the place, metres: after a restart of
+/// this service nothing else tells.
+const LANDED_WITHIN_M: f64 = 5.0;
+/// The take-off height is at least this much above the ground that it stands on, metres.
+const CLIMB_M_MIN: f64 = 2.5;
+
+impl Executor {
+    /// It was in the air and is not any more.
+    pub(super) fn touched_down(&mut self) {
+        if let (Some(Goal::Land { .. }), Some(own)) = (&self.active, &self.own)
+            && !self.control.hands_off()
+        {
+            self.touchdown = Some(LocalPoint::from(own.state.position_ned_m));
+        }
+        self.landed_for_goal = true;
+        self.restarted_at = None;
+        self.fail_safes = FailSafes::default();
+        self.let_go();
+    }
+
+    /// One step on the ground.
+    pub(super) fn stand(&mut self, own: &VehicleState, goal: Option<Goal>, now: Stamp, outputs: &mut Vec<Output>) {
+        self.let_go();
+        let Some(goal) = goal else { return self.set(Activity::Idle, "no task") };
+        let flown = self.flown.as_ref().is_some_and(|flown| flown.is_same_as(&goal));
+        if let Goal::Land { point, .. } = &goal {
+            let here = LocalPoint::from(own.position_ned_m);
+            if !self.landed_for_goal && here.distance_m(point) <= LANDED_WITHIN_M {
+                // Landed before a restart.
+                self.landed_for_goal = true;
+                self.touchdown = Some(here);
+            }
+        }
+        if !goal.wants_flight() || flown {
+            // Motors that still turn after a flight are stopped; those that a person started are the person's.
+            if own.armed && self.flown.is_some() && own.landed == LandedState::OnGround {
+                self.request(Command::Disarm { force: false }, now, outputs);
+            }
+            let landed = self.landed_for_goal || self.flown.is_some();
+            return self.set(if landed { Activity::Landed } else { Activity::Idle }, "");
+        }
+        match self.obstacle_to_take_off(own, &goal, now) {
+            Some(reason) => {
+                // Armed for a take-off that may not be: stop the motors again.
+                if own.armed && self.pending.as_ref().is_some_and(|pending| pending.command == Command::Arm) {
+                    self.request(Command::Disarm { force: false }, now, outputs);
+                }
+                self.set(Activity::Preparing, reason);
+            }
+            None if own.mode != FlightMode::Guided => {
+                self.request(Command::SetMode(FlightMode::Guided), now, outputs);
+                self.set(Activity::Preparing, "setting GUIDED");
+            }
+            None if !own.armed => {
+                self.request(Command::Arm, now, outputs);
+                self.set(Activity::Preparing, "arming");
+            }
+            None => {
+                let ground_m = -own.position_ned_m.z;
+                let height_m = self.config.limits.safe_height_m.max(ground_m + CLIMB_M_MIN);
+                let height_above_home_m = height_m - self.config.home_height_m;
+                self.request(Command::TakeOff { height_above_home_m }, now, outputs);
+                self.climb = Some(Climb { height_m, since: now });
+                self.flown = None;
+                self.set(Activity::TakingOff, format!("to {height_m:.1} m"));
+            }
+        }
+    }
+
+    /// Why it may not take off for `goal` now, if it may not.
+    pub(super) fn obstacle_to_take_off(&self, own: &VehicleState, goal: &Goal, now: Stamp) -> Option<String> {
+        let planned = self.direct.is_none();
+        if planned && (self.plan_health(now) == PlanHealth::Lapsed || self.plan.as_ref().is_none_or(|plan| !plan.assigned)) {
+            return Some("waiting for a valid plan".into());
+        }
+        if !own.estimator_ok {
+            return Some("waiting for the estimator's position".into());
+        }
+        if !own.armed && !own.ready_to_arm {
+            return Some("waiting for the autopilot's arming checks".into());
+        }
+        let needed = self.config.fail_safe.battery_take_off_fraction;
+        match own.battery_fraction {
+            None => return Some("battery unknown".into()),
+            Some(fraction) if fraction < needed => {
+                return Some(format!("battery {:.0} %, needs {:.0} %", 100.0 * fraction, 100.0 * needed));
+            }
+            Some(_) => {}
+        }
+        if own.home.is_none() && own.armed {
+            return Some("waiting for the autopilot's home".into());
+        }
+        if let Goal::Follow { leader, .. } = goal {
+            let track = self.neighbours.get(leader);
+            let may = interlock::may_follow(leader, track, &self.config.limits, &self.config.fail_safe, now);
+            if let Err(refusal) = may {
+                return Some(refusal.to_string());
+            }
+        }
+        let keep_m = self.config.limits.separation_m_min;
+        let near = self.neighbours.iter().find(|(_, track)| {
+            let away_m = (track.predict(now, 0.0).position_ned_m - own.position_ned_m).xy().norm();
+            away_m < if track.parked() { self.config.limits.separation_parked_m } else { keep_m } && track.silent_s(now) < 30.0
+        });
+        near.map(|(vehicle, _)| format!("{vehicle} is too near to take off"))
+    }
+}

@@ -1,0 +1,198 @@
+//! Where a follower should be, and a smooth way there.
+//!
+//! The slot is given in the leader's heading frame (forward, right, up); line abreast at separation S is the thesis's
+//! (6-1 … 6-8), without its singularity at 90° and 270° since the frame is rotated, not solved for.
+
+use nalgebra::{Rotation3, Vector3};
+
+use halcyon_model::Slot;
+
+use super::limits::Limits;
+use super::track::Motion;
+
+/// What the autopilot is asked to follow: position with velocity feed-forward, in the fleet's local frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Setpoint {
+    /// Position, metres north, east, down of the fleet's origin.
+    pub position_ned_m: Vector3<f64>,
+    /// Velocity feed-forward, metres per second.
+    pub velocity_ned_mps: Vector3<f64>,
+    /// Heading, radians clockwise from north; `None` leaves it.
+    pub heading_rad: Option<f64>,
+}
+
+impl Setpoint {
+    /// Height above mean water, metres.
+    #[must_use]
+    pub fn height_m(&self) -> f64 {
+        -self.position_ned_m.z
+    }
+}
+
+/// Where the slot is and how it moves: the leader's velocity plus the slot's swing when the leader turns.
+#[must_use]
+pub fn slot_motion(leader: &Motion, slot: &Slot) -> Motion {
+    let ned_from_heading = Rotation3::from_axis_angle(&Vector3::z_axis(), leader.heading_rad);
+    let offset_ned_m = ned_from_heading * Vector3::new(slot.forward_m, slot.right_m, -slot.up_m);
+    let swing_ned_mps = Vector3::new(0.0, 0.0, leader.yaw_rate_radps).cross(&offset_ned_m);
+    Motion {
+        position_ned_m: leader.position_ned_m + offset_ned_m,
+        velocity_ned_mps: leader.velocity_ned_mps + swing_ned_mps,
+        ..*leader
+    }
+}
+
+/// Speed at which to approach something `distance_m` away so that braking at `deceleration_mps2` just suffices, with a linear
+/// law of gain `gain_hz` near the end where the square root would be too steep.
+#[must_use]
+pub fn approach_speed_mps(distance_m: f64, gain_hz: f64, deceleration_mps2: f64) -> f64 {
+    let linear_m = deceleration_mps2 / (gain_hz * gain_hz);
+    if distance_m <= linear_m {
+        gain_hz * distance_m
+    } else {
+        (2.0 * deceleration_mps2 * (distance_m - 0.5 * linear_m)).sqrt()
+    }
+}
+
+/// A goal of one guidance step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Target {
+    /// Position, fleet-local, metres.
+    pub position_ned_m: Vector3<f64>,
+    /// Its own velocity, metres per second: zero for a fixed place.
+    pub velocity_ned_mps: Vector3<f64>,
+    /// Downward speed limit, metres per second.
+    pub descent_mps: f64,
+}
+
+/// Gain of the final approach to a goal, 1/s.
+const GAIN_HZ: f64 = 1.0;
+/// The reference never runs further ahead of the vehicle than this, metres.
+const LEASH_M: f64 = 3.0;
+
+/// The moving reference that becomes the setpoint. Its velocity is limited in size and change, so that every setpoint is
+/// flyable and the separation filter has the last word on it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reference {
+    /// Position, metres.
+    pub position_ned_m: Vector3<f64>,
+    /// Velocity, metres per second.
+    pub velocity_ned_mps: Vector3<f64>,
+}
+
+impl Reference {
+    /// The velocity that goes for `target`, before separation.
+    #[must_use]
+    pub fn wanted_mps(&self, target: &Target, limits: &Limits, dt_s: f64) -> Vector3<f64> {
+        let error_m = target.position_ned_m - self.position_ned_m;
+        let across_m = Vector3::new(error_m.x, error_m.y, 0.0);
+        let distance_m = across_m.norm();
+        // Braking is planned softer than the limit, so that the change limit below doesn't make it overshoot.
+        let closing_mps = approach_speed_mps(distance_m, GAIN_HZ, 0.7 * limits.acceleration_mps2).min(limits.cruise_mps);
+        let mut wanted = target.velocity_ned_mps;
+        if distance_m > 1e-9 {
+            wanted += across_m * (closing_mps / distance_m);
+        }
+        let vertical_mps = approach_speed_mps(error_m.z.abs(), GAIN_HZ, 0.5 * limits.acceleration_mps2) * error_m.z.signum();
+        wanted.z += vertical_mps;
+        limit_velocity(&mut wanted, limits, target.descent_mps);
+        // Change limit.
+        let change = wanted - self.velocity_ned_mps;
+        let change_max_mps = limits.acceleration_mps2 * dt_s;
+        if change.norm() > change_max_mps { self.velocity_ned_mps + change * (change_max_mps / change.norm()) } else { wanted }
+    }
+
+    /// Moves on by `dt_s` at `velocity`, leashed to where the vehicle is.
+    pub fn advance(&mut self, velocity_ned_mps: Vector3<f64>, own_position_ned_m: Vector3<f64>, dt_s: f64) {
+        self.velocity_ned_mps = velocity_ned_mps;
+        self.position_ned_m += velocity_ned_mps * dt_s;
+        let lead_m = self.position_ned_m - own_position_ned_m;
+        if lead_m.norm() > LEASH_M {
+            self.position_ned_m = own_position_ned_m + lead_m * (LEASH_M / lead_m.norm());
+        }
+    }
+}
+
+/// Clamps horizontal and vertical speed.
+pub fn limit_velocity(velocity_ned_mps: &mut Vector3<f64>, limits: &Limits, descent_mps: f64) {
+    let across_mps = velocity_ned_mps.xy().norm();
+    if across_mps > limits.speed_mps_max {
+        let scale = limits.speed_mps_max / across_mps;
+        velocity_ned_mps.x *= scale;
+        velocity_ned_mps.y *= scale;
+    }
+    velocity_ned_mps.z = velocity_ned_mps.z.clamp(-limits.climb_mps, descent_mps);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+    use proptest::prelude::*;
+    use std::f64::consts::PI;
+
+    fn leader(heading_rad: f64) -> Motion {
+        Motion {
+            position_ned_m: Vector3::new(10.0, -4.0, -6.0),
+            velocity_ned_mps: Vector3::new(1.0, 0.5, -0.1),
+            heading_rad,
+            yaw_rate_radps: 0.3,
+        }
+    }
+
+    /// The thesis's closed form (6-6, 6-7) where it isn't singular: x2 = x1 ± S cos φ, y2 = y1 + (x2 − x1) tan φ, with φ the
+    /// inclination of the separation line, here across the heading.
+    #[test]
+    fn line_abreast_is_the_thesiss_place() {
+        for heading_deg in [0.0f64, 30.0, 60.0, 120.0, 200.0, 300.0] {
+            let heading_rad = heading_deg.to_radians();
+            let leader = leader(heading_rad);
+            let slot = slot_motion(&leader, &Slot { forward_m: 0.0, right_m: 7.0, up_m: 0.0 });
+            let delta = slot.position_ned_m - leader.position_ned_m;
+            // (6-1) the distance is S, (6-8) the height is the leader's, and the line is orthogonal to the heading.
+            assert_relative_eq!(delta.xy().norm(), 7.0, epsilon = 1e-12);
+            assert_relative_eq!(delta.z, 0.0);
+            assert_relative_eq!(delta.x * heading_rad.cos() + delta.y * heading_rad.sin(), 0.0, epsilon = 1e-12);
+            // To the right: the heading turned clockwise by a right angle.
+            assert_relative_eq!(delta.y.atan2(delta.x).rem_euclid(2.0 * PI), (heading_rad + PI / 2.0).rem_euclid(2.0 * PI), epsilon = 1e-9);
+        }
+    }
+
+    proptest! {
+        /// The slot's velocity is the time derivative of its position, for a leader on a circle.
+        #[test]
+        fn slot_velocity_is_the_derivative(heading in 0.0f64..6.28, rate in -1.0f64..1.0, f in -9.0f64..9.0, r in -9.0f64..9.0) {
+            let slot = Slot { forward_m: f, right_m: r, up_m: 1.0 };
+            let at = |t: f64| {
+                let leader = Motion {
+                    position_ned_m: Vector3::new(2.0, 1.0, -5.0) * t,
+                    velocity_ned_mps: Vector3::new(2.0, 1.0, -5.0),
+                    heading_rad: heading + rate * t,
+                    yaw_rate_radps: rate,
+                };
+                slot_motion(&leader, &slot)
+            };
+            let h = 1e-5;
+            let numeric = (at(h).position_ned_m - at(-h).position_ned_m) / (2.0 * h);
+            prop_assert!((numeric - at(0.0).velocity_ned_mps).norm() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn the_reference_arrives_without_overshoot_and_within_its_limits() {
+        let limits = Limits::default();
+        let mut reference = Reference { position_ned_m: Vector3::new(0.0, 0.0, -5.0), velocity_ned_mps: Vector3::zeros() };
+        let goal = Vector3::new(60.0, 0.0, -8.0);
+        let target = Target { position_ned_m: goal, velocity_ned_mps: Vector3::zeros(), descent_mps: 0.5 };
+        for _ in 0..400 {
+            let before = reference.velocity_ned_mps;
+            let velocity = reference.wanted_mps(&target, &limits, 0.1);
+            assert!((velocity - before).norm() <= limits.acceleration_mps2 * 0.1 + 1e-9);
+            assert!(velocity.xy().norm() <= limits.cruise_mps + 1e-9 && velocity.z.abs() <= limits.climb_mps + 1e-9);
+            let own = reference.position_ned_m;
+            reference.advance(velocity, own, 0.1);
+            assert!(reference.position_ned_m.x < 60.3, "{}", reference.position_ned_m.x);
+        }
+        assert!((reference.position_ned_m - goal).norm() < 0.05, "{}", reference.position_ned_m);
+    }
+}

@@ -1,0 +1,18 @@
+//! The pure core: synchronous, deterministic, takes `now`, does no I/O.
+
+pub mod commands;
+pub mod control;
+pub mod encode;
+pub mod executor;
+pub mod failsafe;
+pub mod guidance;
+pub mod interlock;
+pub mod limits;
+pub mod separation;
+pub mod streams;
+pub mod telemetry;
+pub mod text;
+pub mod track;
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,214 @@
+//! The separation filter: the last word on every commanded velocity.
+//!
+//! For each vehicle heard, the speed of closing in is limited to what can still be braked before the kept distance, with a
+//! reaction time; inside the kept distance the vehicle opens. Where an obstacle stands between the vehicle and its goal it goes
+//! round, by the shorter side, on the right when both are equal.
+
+use nalgebra::Vector3;
+
+use halcyon_model::Stamp;
+
+use super::limits::Limits;
+use super::track::Track;
+
+/// Braking that the filter counts on, metres per second squared: less than any multicopter can do.
+const BRAKING_MPS2: f64 = 1.5;
+/// From the decision to the deceleration, seconds: a guidance tick, the link, and the autopilot's attitude loop.
+const REACTION_S: f64 = 0.6;
+/// Gain with which a kept distance that was broken is restored, 1/s.
+const OPENING_HZ: f64 = 1.0;
+/// Speed at which it is restored at most, relative to the obstacle, metres per second.
+const OPENING_MPS_MAX: f64 = 2.0;
+/// A silent vehicle may have gone anywhere: its kept distance grows by this much a second, up to [`GROWTH_M_MAX`].
+const GROWTH_MPS: f64 = 0.5;
+const GROWTH_M_MAX: f64 = 3.0;
+/// A flying vehicle silent for so long is forgotten, seconds; a parked one stays where it was.
+const FORGET_S: f64 = 30.0;
+/// Projections over all constraints; a handful of vehicles converges in two or three.
+const PASSES: usize = 8;
+
+/// Something to stay clear of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Obstacle {
+    /// Fleet-local position, metres.
+    pub position_ned_m: Vector3<f64>,
+    /// Velocity, metres per second.
+    pub velocity_ned_mps: Vector3<f64>,
+    /// Distance to keep, metres, margin included.
+    pub keep_m: f64,
+}
+
+/// The obstacle that a track is at `now`; `None` once it is forgotten.
+#[must_use]
+pub fn obstacle(track: &Track, limits: &Limits, now: Stamp) -> Option<Obstacle> {
+    let silent_s = track.silent_s(now);
+    if track.parked() {
+        let position_ned_m = track.state.position_ned_m;
+        return Some(Obstacle { position_ned_m, velocity_ned_mps: Vector3::zeros(), keep_m: limits.separation_parked_m });
+    }
+    if silent_s > FORGET_S {
+        return None;
+    }
+    let motion = track.predict(now, 0.0);
+    let growth_m = (GROWTH_MPS * (silent_s - 1.0)).clamp(0.0, GROWTH_M_MAX);
+    Some(Obstacle {
+        position_ned_m: motion.position_ned_m,
+        // Beyond the prediction nobody knows how it moves.
+        velocity_ned_mps: if silent_s > 1.5 { Vector3::zeros() } else { motion.velocity_ned_mps },
+        keep_m: limits.separation_m_min + limits.separation_margin_m + growth_m,
+    })
+}
+
+/// Least opening speed (negative: greatest closing speed) at a gap to the kept distance, metres per second.
+fn opening_mps_min(gap_m: f64) -> f64 {
+    if gap_m <= 0.0 {
+        (-gap_m * OPENING_HZ).min(OPENING_MPS_MAX)
+    } else {
+        let reaction_mps = BRAKING_MPS2 * REACTION_S;
+        reaction_mps - (reaction_mps * reaction_mps + 2.0 * BRAKING_MPS2 * gap_m).sqrt()
+    }
+}
+
+/// One half-space of velocities: `normal · v ≥ bound_mps`, corrected along `push`.
+struct Constraint {
+    normal: Vector3<f64>,
+    push: Vector3<f64>,
+    bound_mps: f64,
+}
+
+fn constraint(point_ned_m: Vector3<f64>, obstacle: &Obstacle) -> Constraint {
+    let away_m = point_ned_m - obstacle.position_ned_m;
+    let distance_m = away_m.norm();
+    let normal = if distance_m > 1e-6 { away_m / distance_m } else { Vector3::new(0.0, 0.0, -1.0) };
+    let bound_mps = normal.dot(&obstacle.velocity_ned_mps) + opening_mps_min(distance_m - obstacle.keep_m);
+    // Up is always free; down is not, so a vehicle below gives way sideways.
+    let across = Vector3::new(normal.x, normal.y, 0.0);
+    let push = if normal.z <= 0.0 {
+        normal
+    } else if across.norm() > 0.2 {
+        across / across.norm()
+    } else {
+        Vector3::x()
+    };
+    Constraint { normal, push, bound_mps }
+}
+
+/// A way round an obstacle that stands between `own` and `goal`: the tangential unit vector, or `None` if the way is free or
+/// the goal itself lies within the kept distance (then there is nowhere to go round to).
+fn way_round(own_ned_m: Vector3<f64>, goal_ned_m: Vector3<f64>, obstacle: &Obstacle) -> Option<Vector3<f64>> {
+    if (goal_ned_m - obstacle.position_ned_m).norm() < obstacle.keep_m {
+        return None;
+    }
+    let path_m = (goal_ned_m - own_ned_m).xy();
+    let to_obstacle_m = (obstacle.position_ned_m - own_ned_m).xy();
+    let length_m = path_m.norm();
+    if length_m < 1e-6 {
+        return None;
+    }
+    let along_m = to_obstacle_m.dot(&path_m) / length_m;
+    if along_m <= 0.0 || to_obstacle_m.norm() > obstacle.keep_m + 3.0 {
+        return None;
+    }
+    // Positive when the obstacle lies to the right of the path: then the left side is the shorter.
+    let right_m = (path_m.x * to_obstacle_m.y - path_m.y * to_obstacle_m.x) / length_m;
+    if right_m.abs() >= obstacle.keep_m && along_m > 0.0 {
+        return None;
+    }
+    let outward = -to_obstacle_m / to_obstacle_m.norm().max(1e-6);
+    let (left, right) = (Vector3::new(-outward.y, outward.x, 0.0), Vector3::new(outward.y, -outward.x, 0.0));
+    // `right` leaves the obstacle on the left-hand side. Ties, within what noise can turn over, go right.
+    let path_right = Vector3::new(-path_m.y, path_m.x, 0.0) / length_m;
+    let wanted = if right_m > 0.5 { -path_right } else { path_right };
+    Some(if left.dot(&wanted) > right.dot(&wanted) { left } else { right })
+}
+
+/// The velocity nearest to `wanted` that keeps every distance, for the vehicle at `own` and its reference at `reference`.
+///
+/// If an obstacle comes faster than the vehicle may fly, it flees at its speed limit.
+#[must_use]
+pub fn filter(
+    wanted_ned_mps: Vector3<f64>,
+    points_ned_m: [Vector3<f64>; 2],
+    goal_ned_m: Vector3<f64>,
+    obstacles: &[Obstacle],
+    limits: &Limits,
+) -> Vector3<f64> {
+    let mut velocity = wanted_ned_mps;
+    // Sideways first, so that the projections below have the last word.
+    for obstacle in obstacles {
+        if let Some(tangent) = way_round(points_ned_m[1], goal_ned_m, obstacle) {
+            let constraint = constraint(points_ned_m[1], obstacle);
+            let refused_mps = constraint.bound_mps - constraint.normal.dot(&velocity);
+            if refused_mps > 0.0 {
+                velocity += tangent * refused_mps.min(0.5 * limits.cruise_mps);
+            }
+        }
+    }
+    for _ in 0..PASSES {
+        let mut kept = true;
+        for obstacle in obstacles {
+            for point in points_ned_m {
+                let Constraint { normal, push, bound_mps } = constraint(point, obstacle);
+                let refused_mps = bound_mps - normal.dot(&velocity);
+                if refused_mps > 1e-9 {
+                    kept = false;
+                    // Along `push`, by as much as brings the component along `normal` up to the bound.
+                    velocity += push * (refused_mps / normal.dot(&push).max(0.2));
+                }
+            }
+        }
+        if kept {
+            break;
+        }
+    }
+    velocity
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn still(x: f64, y: f64, z: f64) -> Obstacle {
+        Obstacle { position_ned_m: Vector3::new(x, y, z), velocity_ned_mps: Vector3::zeros(), keep_m: 5.0 }
+    }
+
+    /// Braking from the allowed closing speed after the reaction time stops exactly at the kept distance: v τ + v²/2a = gap.
+    #[test]
+    fn allowed_closing_speed_is_the_stopping_distance() {
+        for gap_m in [0.1, 1.0, 4.0, 20.0] {
+            let closing = -opening_mps_min(gap_m);
+            let stopping_m = closing * REACTION_S + closing * closing / (2.0 * BRAKING_MPS2);
+            assert!((stopping_m - gap_m).abs() < 1e-9, "{gap_m} {stopping_m}");
+        }
+    }
+
+    #[test]
+    fn free_air_changes_nothing() {
+        let wanted = Vector3::new(3.0, 1.0, 0.0);
+        let own = Vector3::new(0.0, 0.0, -5.0);
+        let goal = Vector3::new(100.0, 30.0, -5.0);
+        let limits = Limits::default();
+        assert_eq!(filter(wanted, [own, own], goal, &[still(-20.0, 0.0, -5.0)], &limits), wanted);
+        assert_eq!(filter(wanted, [own, own], goal, &[], &limits), wanted);
+    }
+
+    #[test]
+    fn an_obstacle_ahead_is_passed_on_the_right_and_never_closed_in_on() {
+        let own = Vector3::new(0.0, 0.0, -5.0);
+        let goal = Vector3::new(40.0, 0.0, -5.0);
+        let velocity = filter(Vector3::new(5.0, 0.0, 0.0), [own, own], goal, &[still(5.5, 0.0, -5.0)], &Limits::default());
+        assert!(velocity.y > 0.5, "{velocity}");
+        assert!(velocity.x <= -opening_mps_min(0.5) + 1e-9, "{velocity}");
+    }
+
+    #[test]
+    fn a_vehicle_above_stops_its_descent_and_one_below_moves_aside() {
+        let limits = Limits::default();
+        let above = Vector3::new(0.1, 0.0, -6.0);
+        let down = filter(Vector3::new(0.0, 0.0, 0.5), [above, above], above, &[still(0.0, 0.0, -1.0)], &limits);
+        assert!(down.z < 0.05, "{down}");
+        let below = Vector3::new(0.1, 0.0, -5.0);
+        let aside = filter(Vector3::zeros(), [below, below], below, &[still(0.0, 0.0, -8.0)], &limits);
+        assert!(aside.z.abs() < 1e-9 && aside.x > 0.5, "{aside}");
+    }
+}

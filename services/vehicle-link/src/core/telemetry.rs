@@ -1,0 +1,414 @@
+//! Folds MAVLink messages into the vehicle's state. Unknown stays unknown: `None`, or `false` where `true` would be permission.
+//!
+//! # Height
+//! Height above mean water is the autopilot's altitude relative to home plus home's known height above the water
+//! (`home_height_m`). The other choice, GNSS altitude above mean sea level less the origin's, is off by metres (GNSS is worse
+//! upwards than sideways, geoid models differ by decimetres, a lake isn't at sea level); the barometer and the estimator hold the
+//! relative one to decimetres over a flight, and a jetty's height is measured with a tape.
+
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+
+use halcyon_model::{
+    Activity, Fix, FleetOrigin, FlightMode, Geodetic, LandedState, LocalFrame, Role, Stamp, VehicleId, VehicleState,
+};
+use mavlink::dialects::ardupilotmega as ardu;
+use mavlink::dialects::ardupilotmega::{EkfStatusFlags as Ekf, EstimatorStatusFlags as Estimator, MavMessage};
+
+/// After so long without news, a health value is unknown again, seconds.
+const HEALTH_AGE_S: f64 = 5.0;
+const BATTERY_AGE_S: f64 = 10.0;
+/// The boot clock's offset to the fleet's is the least delay seen in the last one to two of these, seconds.
+const OFFSET_WINDOW_S: f64 = 10.0;
+
+/// A value and when it came.
+#[derive(Debug, Clone, Copy)]
+struct Aged<T>(T, Stamp);
+
+impl<T: Copy> Aged<T> {
+    fn fresh(this: Option<Self>, now: Stamp, age_s: f64) -> Option<T> {
+        this.filter(|aged| now.seconds_since(aged.1) <= age_s).map(|aged| aged.0)
+    }
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Position {
+    geodetic: Geodetic,
+    relative_altitude_m: f64,
+    velocity_ned_mps: Vector3<f64>,
+    stamp: Stamp,
+}
+
+/// Everything heard from one autopilot.
+#[derive(Debug, Clone)]
+pub struct Telemetry {
+    vehicle: VehicleId,
+    role: Role,
+    frame: LocalFrame,
+    home_height_m: f64,
+    boot: BootClock,
+    heartbeat: Option<Aged<(FlightMode, bool)>>,
+    position: Option<Position>,
+    attitude: Option<UnitQuaternion<f64>>,
+    home: Option<Geodetic>,
+    landed: Option<Aged<LandedState>>,
+    battery: Option<Aged<(Option<f64>, Option<f64>)>>,
+    fix: Option<Aged<Fix>>,
+    estimator_ok: Option<Aged<bool>>,
+    prearm_ok: Option<Aged<bool>>,
+    heard: Option<Stamp>,
+}
+
+impl Telemetry {
+    /// For one vehicle in the fleet's frame. `home_height_m`: height of its home above mean water, metres.
+    #[must_use]
+    pub fn new(vehicle: VehicleId, role: Role, origin: FleetOrigin, home_height_m: f64) -> Self {
+        Self {
+            vehicle,
+            role,
+            frame: origin.frame(),
+            home_height_m,
+            boot: BootClock::default(),
+            heartbeat: None,
+            position: None,
+            attitude: None,
+            home: None,
+            landed: None,
+            battery: None,
+            fix: None,
+            estimator_ok: None,
+            prearm_ok: None,
+            heard: None,
+        }
+    }
+
+    /// Takes one message of the vehicle's autopilot, received at `now`. Returns whether it was one that moves the vehicle's
+    /// picture on (position, attitude or heartbeat).
+    pub fn observe(&mut self, message: &MavMessage, now: Stamp) -> bool {
+        self.heard = Some(now);
+        match message {
+            MavMessage::HEARTBEAT(data) => {
+                let armed = data.base_mode.contains(ardu::MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED);
+                self.heartbeat = Some(Aged((FlightMode::from_copter(data.custom_mode), armed), now));
+                return true;
+            }
+            MavMessage::GLOBAL_POSITION_INT(data) => {
+                let stamp = self.boot.stamp(data.time_boot_ms, now);
+                self.position = position(data, stamp);
+                return true;
+            }
+            MavMessage::ATTITUDE_QUATERNION(data) => {
+                let q = [data.q1, data.q2, data.q3, data.q4].map(f64::from);
+                let quaternion = Quaternion::new(q[0], q[1], q[2], q[3]);
+                // A quaternion far from unit length is no attitude.
+                if (quaternion.norm() - 1.0).abs() < 0.1 {
+                    self.attitude = Some(UnitQuaternion::from_quaternion(quaternion));
+                }
+                return true;
+            }
+            MavMessage::ATTITUDE(data) => {
+                let [roll, pitch, yaw] = [data.roll, data.pitch, data.yaw].map(f64::from);
+                if [roll, pitch, yaw].iter().all(|angle| angle.is_finite()) {
+                    self.attitude = Some(UnitQuaternion::from_euler_angles(roll, pitch, yaw));
+                }
+                return true;
+            }
+            MavMessage::HOME_POSITION(data) => {
+                self.home = geodetic(data.latitude, data.longitude, data.altitude);
+            }
+            MavMessage::EXTENDED_SYS_STATE(data) => self.landed = Some(Aged(landed(data.landed_state), now)),
+            MavMessage::SYS_STATUS(data) => self.observe_sys_status(data, now),
+            MavMessage::BATTERY_STATUS(data) if data.id == 0 => self.observe_battery(data, now),
+            MavMessage::GPS_RAW_INT(data) => {
+                self.fix = Some(Aged(
+                    Fix {
+                        // Kinds beyond 6 (static, PPP) are at least three-dimensional.
+                        kind: (data.fix_type as u32).min(6),
+                        satellites: if data.satellites_visible == u8::MAX { 0 } else { data.satellites_visible.into() },
+                        horizontal_sigma_m: (data.h_acc != 0).then(|| f64::from(data.h_acc) * 1e-3),
+                    },
+                    now,
+                ));
+            }
+            MavMessage::EKF_STATUS_REPORT(data) => {
+                let need = Ekf::EKF_ATTITUDE
+                    | Ekf::EKF_VELOCITY_HORIZ
+                    | Ekf::EKF_VELOCITY_VERT
+                    | Ekf::EKF_POS_HORIZ_ABS
+                    | Ekf::EKF_POS_VERT_ABS;
+                let refuse = Ekf::EKF_CONST_POS_MODE | Ekf::EKF_UNINITIALIZED | Ekf::EKF_GPS_GLITCHING;
+                // Innovations over 1 are outside the estimator's gate (ArduPilot's FS_EKF_THRESH acts from 0.8); NaN fails.
+                let inside = data.velocity_variance < 1.0 && data.pos_horiz_variance < 1.0;
+                let ok = data.flags.contains(need) && !data.flags.intersects(refuse) && inside;
+                self.estimator_ok = Some(Aged(ok, now));
+            }
+            // PX4's way to say the same.
+            MavMessage::ESTIMATOR_STATUS(data) => {
+                let need = Estimator::ESTIMATOR_ATTITUDE
+                    | Estimator::ESTIMATOR_VELOCITY_HORIZ
+                    | Estimator::ESTIMATOR_VELOCITY_VERT
+                    | Estimator::ESTIMATOR_POS_HORIZ_ABS
+                    | Estimator::ESTIMATOR_POS_VERT_ABS;
+                let refuse = Estimator::ESTIMATOR_CONST_POS_MODE | Estimator::ESTIMATOR_GPS_GLITCH;
+                self.estimator_ok = Some(Aged(data.flags.contains(need) && !data.flags.intersects(refuse), now));
+            }
+            MavMessage::SYSTEM_TIME(data) => {
+                let _ = self.boot.stamp(data.time_boot_ms, now);
+            }
+            _ => {}
+        }
+        false
+    }
+
+    fn observe_sys_status(&mut self, data: &ardu::SYS_STATUS_DATA, now: Stamp) {
+        let prearm = ardu::MavSysStatusSensor::MAV_SYS_STATUS_PREARM_CHECK;
+        let ok = data.onboard_control_sensors_present.contains(prearm)
+            && data.onboard_control_sensors_enabled.contains(prearm)
+            && data.onboard_control_sensors_health.contains(prearm);
+        self.prearm_ok = Some(Aged(ok, now));
+        let fraction = (0..=100).contains(&data.battery_remaining).then(|| f64::from(data.battery_remaining) * 0.01);
+        let volts = (data.voltage_battery != u16::MAX && data.voltage_battery != 0).then(|| f64::from(data.voltage_battery) * 1e-3);
+        self.merge_battery(fraction, volts, now);
+    }
+
+    fn observe_battery(&mut self, data: &ardu::BATTERY_STATUS_DATA, now: Stamp) {
+        let fraction = (0..=100).contains(&data.battery_remaining).then(|| f64::from(data.battery_remaining) * 0.01);
+        let cells = data.voltages.iter().filter(|cell| **cell != u16::MAX && **cell != 0);
+        let volts: f64 = cells.map(|cell| f64::from(*cell) * 1e-3).sum();
+        self.merge_battery(fraction, (volts > 0.0).then_some(volts), now);
+    }
+
+    /// One message may know the charge and another the voltage; one that knows neither says nothing, and so ages.
+    fn merge_battery(&mut self, fraction: Option<f64>, volts: Option<f64>, now: Stamp) {
+        if fraction.is_some() || volts.is_some() {
+            let (old_fraction, old_volts) = Aged::fresh(self.battery, now, BATTERY_AGE_S).unwrap_or_default();
+            // The charge decides about safety: it may not be kept alive by voltages.
+            let stamp = if fraction.is_some() { now } else { self.battery.map_or(now, |aged| aged.1) };
+            self.battery = Some(Aged((fraction.or(old_fraction), volts.or(old_volts)), stamp));
+        }
+    }
+
+    /// When the autopilot was last heard.
+    #[must_use]
+    pub fn heard(&self) -> Option<Stamp> {
+        self.heard
+    }
+
+    /// When its mode was last heard.
+    #[must_use]
+    pub fn heartbeat_heard(&self) -> Option<Stamp> {
+        self.heartbeat.map(|heartbeat| heartbeat.1)
+    }
+
+    /// What is still missing before there is a state, for people.
+    #[must_use]
+    pub fn missing(&self) -> &'static str {
+        match (self.heartbeat, self.position, self.attitude) {
+            (None, _, _) => "waiting for the autopilot's heartbeat",
+            (_, None, _) => "waiting for the autopilot's position",
+            (_, _, None) => "waiting for the autopilot's attitude",
+            _ => "",
+        }
+    }
+
+    /// The state at `now`; `None` until mode, position and attitude have been heard. Activity, plan and touchdown are the
+    /// executor's to fill in.
+    #[must_use]
+    pub fn state(&self, now: Stamp) -> Option<VehicleState> {
+        let (position, attitude) = (self.position?, self.attitude?);
+        let (mode, armed) = self.heartbeat?.0;
+        let height_m = position.relative_altitude_m + self.home_height_m;
+        // North and east from the map, down from the height above water: see the module's documentation.
+        let at_height = Geodetic { altitude_m: self.frame.origin().altitude_m + height_m, ..position.geodetic };
+        let mut position_ned_m = self.frame.ned_from_geodetic(at_height);
+        position_ned_m.z = -height_m;
+        let (battery_fraction, battery_v) = Aged::fresh(self.battery, now, BATTERY_AGE_S).unwrap_or_default();
+        let fix = Aged::fresh(self.fix, now, HEALTH_AGE_S);
+        let estimator_ok = Aged::fresh(self.estimator_ok, now, HEALTH_AGE_S).unwrap_or(false);
+        let ready_to_arm = Aged::fresh(self.prearm_ok, now, HEALTH_AGE_S).unwrap_or(false);
+        Some(VehicleState {
+            stamp: position.stamp,
+            vehicle: self.vehicle.clone(),
+            role: self.role,
+            position: position.geodetic,
+            position_ned_m,
+            velocity_ned_mps: position.velocity_ned_mps,
+            ned_from_body: attitude,
+            heading_rad: attitude.euler_angles().2.rem_euclid(std::f64::consts::TAU),
+            home: self.home,
+            mode,
+            armed,
+            landed: Aged::fresh(self.landed, now, HEALTH_AGE_S).unwrap_or(LandedState::Unknown),
+            battery_fraction,
+            battery_v,
+            fix,
+            estimator_ok: estimator_ok && fix.is_some_and(|fix| fix.kind >= 3),
+            ready_to_arm,
+            boot_s: f64::from(self.boot.last_ms.unwrap_or(0)) * 1e-3,
+            activity: Activity::Idle,
+            plan_generation: 0,
+            touchdown: None,
+        })
+    }
+}
+
+fn position(data: &ardu::GLOBAL_POSITION_INT_DATA, stamp: Stamp) -> Option<Position> {
+    Some(Position {
+        geodetic: geodetic(data.lat, data.lon, data.alt)?,
+        relative_altitude_m: f64::from(data.relative_alt) * 1e-3,
+        velocity_ned_mps: Vector3::new(data.vx.into(), data.vy.into(), data.vz.into()) * 1e-2,
+        stamp,
+    })
+}
+
+/// From MAVLink's 1e-7 degrees and millimetres; (0, 0) is how autopilots say that they don't know.
+fn geodetic(latitude: i32, longitude: i32, altitude_mm: i32) -> Option<Geodetic> {
+    let place =
+        Geodetic::from_deg(f64::from(latitude) * 1e-7, f64::from(longitude) * 1e-7, f64::from(altitude_mm) * 1e-3);
+    (place.is_valid() && (latitude != 0 || longitude != 0)).then_some(place)
+}
+
+fn landed(state: ardu::MavLandedState) -> LandedState {
+    match state {
+        ardu::MavLandedState::MAV_LANDED_STATE_UNDEFINED => LandedState::Unknown,
+        ardu::MavLandedState::MAV_LANDED_STATE_ON_GROUND => LandedState::OnGround,
+        ardu::MavLandedState::MAV_LANDED_STATE_IN_AIR => LandedState::InAir,
+        ardu::MavLandedState::MAV_LANDED_STATE_TAKEOFF => LandedState::TakingOff,
+        ardu::MavLandedState::MAV_LANDED_STATE_LANDING => LandedState::Landing,
+    }
+}
+
+/// Turns the autopilot's time since boot into the fleet's time: the offset is the least seen lately, so that queueing delay
+/// doesn't date a position later than it was measured.
+#[derive(Debug, Clone, Copy, Default)]
+struct BootClock {
+    last_ms: Option<u32>,
+    window: Option<(Stamp, i64, i64)>,
+}
+
+impl BootClock {
+    fn stamp(&mut self, boot_ms: u32, now: Stamp) -> Stamp {
+        let offset_ns = now.as_nanos().saturating_sub(i64::from(boot_ms) * 1_000_000);
+        // Back by more than a second: the autopilot started again.
+        if self.last_ms.is_some_and(|last| boot_ms.saturating_add(1000) < last) {
+            self.window = None;
+        }
+        self.last_ms = Some(boot_ms);
+        let (since, current, previous) = self.window.unwrap_or((now, i64::MAX, i64::MAX));
+        let current = current.min(offset_ns);
+        let best = current.min(previous);
+        self.window =
+            Some(if now.seconds_since(since) > OFFSET_WINDOW_S { (now, i64::MAX, current) } else { (since, current, previous) });
+        let stamp = Stamp::from_nanos(i64::from(boot_ms) * 1_000_000 + best);
+        // However wrong that clock is: never ahead of now, never more than a second behind it.
+        stamp.clamp(now.plus_secs_f64(-1.0), now)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mavlink::dialects::ardupilotmega::{EkfStatusFlags, GpsFixType, MavModeFlag, MavSysStatusSensor};
+
+    fn t(s: f64) -> Stamp {
+        Stamp::from_secs_f64(1000.0).plus_secs_f64(s)
+    }
+
+    fn telemetry(home_height_m: f64) -> Telemetry {
+        let origin = FleetOrigin(Geodetic::from_deg(45.0, 7.0, 220.0));
+        Telemetry::new(VehicleId::new("f").unwrap(), Role::Follower, origin, home_height_m)
+    }
+
+    fn basics(telemetry: &mut Telemetry, now: Stamp) {
+        let heartbeat = ardu::HEARTBEAT_DATA { custom_mode: 4, base_mode: MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED, ..Default::default() };
+        telemetry.observe(&MavMessage::HEARTBEAT(heartbeat), now);
+        let position = ardu::GLOBAL_POSITION_INT_DATA {
+            time_boot_ms: 50_000,
+            lat: 450_010_000,
+            lon: 70_000_000,
+            alt: 231_000,
+            relative_alt: 5_000,
+            vx: 150,
+            vz: -20,
+            ..Default::default()
+        };
+        telemetry.observe(&MavMessage::GLOBAL_POSITION_INT(position), now);
+        let attitude = ardu::ATTITUDE_DATA { yaw: -0.5, ..Default::default() };
+        telemetry.observe(&MavMessage::ATTITUDE(attitude), now);
+    }
+
+    #[test]
+    fn unknown_is_none_or_false_and_position_is_from_published_degree_lengths() {
+        let mut telemetry = telemetry(1.5);
+        assert!(telemetry.state(t(0.0)).is_none());
+        basics(&mut telemetry, t(0.0));
+        let state = telemetry.state(t(0.0)).unwrap();
+        // Snyder: a thousandth of a degree at 45° north is 111.132 m.
+        assert!((state.position_ned_m.x - 111.132).abs() < 5e-3, "{}", state.position_ned_m.x);
+        assert_eq!(state.position_ned_m.z, -6.5, "relative altitude plus the height of home, not GNSS altitude");
+        assert_eq!((state.mode, state.armed), (FlightMode::Guided, true));
+        assert!((state.heading_rad - (std::f64::consts::TAU - 0.5)).abs() < 1e-6);
+        assert_eq!(state.velocity_ned_mps, Vector3::new(1.5, 0.0, -0.2));
+        assert!(!state.estimator_ok && !state.ready_to_arm);
+        assert_eq!((state.fix, state.battery_fraction, state.home, state.landed), (None, None, None, LandedState::Unknown));
+    }
+
+    #[test]
+    fn null_island_is_no_position() {
+        let mut telemetry = telemetry(0.0);
+        basics(&mut telemetry, t(0.0));
+        telemetry.observe(&MavMessage::GLOBAL_POSITION_INT(ardu::GLOBAL_POSITION_INT_DATA::default()), t(1.0));
+        assert!(telemetry.state(t(1.0)).is_none());
+        assert_eq!(telemetry.missing(), "waiting for the autopilot's position");
+    }
+
+    #[test]
+    fn health_is_believed_only_while_fresh() {
+        let mut telemetry = telemetry(0.0);
+        basics(&mut telemetry, t(0.0));
+        let good = EkfStatusFlags::from_bits_truncate(831);
+        let ekf = |flags| MavMessage::EKF_STATUS_REPORT(ardu::EKF_STATUS_REPORT_DATA { flags, ..Default::default() });
+        telemetry.observe(&ekf(good), t(0.0));
+        assert!(!telemetry.state(t(0.0)).unwrap().estimator_ok, "no fix yet");
+        let gps = ardu::GPS_RAW_INT_DATA { fix_type: GpsFixType::GPS_FIX_TYPE_3D_FIX, satellites_visible: 9, ..Default::default() };
+        telemetry.observe(&MavMessage::GPS_RAW_INT(gps), t(0.0));
+        assert!(telemetry.state(t(0.0)).unwrap().estimator_ok);
+        assert!(!telemetry.state(t(6.0)).unwrap().estimator_ok, "stale");
+        telemetry.observe(&ekf(good | EkfStatusFlags::EKF_GPS_GLITCHING), t(0.5));
+        assert!(!telemetry.state(t(0.5)).unwrap().estimator_ok);
+        telemetry.observe(&ekf(good & !EkfStatusFlags::EKF_POS_HORIZ_ABS), t(0.6));
+        assert!(!telemetry.state(t(0.6)).unwrap().estimator_ok);
+
+        let prearm = MavSysStatusSensor::MAV_SYS_STATUS_PREARM_CHECK;
+        let status = |health| {
+            MavMessage::SYS_STATUS(ardu::SYS_STATUS_DATA {
+                onboard_control_sensors_present: prearm,
+                onboard_control_sensors_enabled: prearm,
+                onboard_control_sensors_health: health,
+                battery_remaining: 73,
+                voltage_battery: 15_800,
+                ..Default::default()
+            })
+        };
+        telemetry.observe(&status(MavSysStatusSensor::empty()), t(1.0));
+        assert!(!telemetry.state(t(1.0)).unwrap().ready_to_arm);
+        telemetry.observe(&status(prearm), t(2.0));
+        let state = telemetry.state(t(2.0)).unwrap();
+        assert!(state.ready_to_arm);
+        assert_eq!((state.battery_fraction, state.battery_v), (Some(0.73), Some(15.8)));
+        assert_eq!(telemetry.state(t(13.0)).unwrap().battery_fraction, None);
+    }
+
+    /// Messages delayed by a queue are still dated when they were measured; a restarted autopilot starts the offset afresh.
+    #[test]
+    fn delay_does_not_move_the_stamp() {
+        let mut clock = BootClock::default();
+        for step in 0..600u32 {
+            let measured = t(f64::from(step) * 0.1);
+            let delay_s = if step % 7 == 0 { 0.01 } else { 0.01 + 0.3 * f64::from(step % 5) / 5.0 };
+            let stamp = clock.stamp(step * 100, measured.plus_secs_f64(delay_s));
+            assert!((stamp.seconds_since(measured) - 0.01).abs() < 1e-6 || step < 7, "{step}");
+        }
+        let stamp = clock.stamp(0, t(100.0));
+        assert_eq!(stamp, t(100.0));
+    }
+}

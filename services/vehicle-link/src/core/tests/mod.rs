@@ -1,0 +1,7 @@
+//! The executor flown in a small world of its own: double integrators with ArduCopter's modes, no noise, no bus.
+
+mod commands;
+mod failsafes;
+mod flights;
+mod properties;
+mod world;

@@ -1,0 +1,3 @@
+//! The autopilot's end of the service: sockets and serial ports.
+
+pub mod link;

@@ -1,0 +1,145 @@
+//! The service against a scripted autopilot on real sockets.
+
+mod peer;
+
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+use halcyon_chassis::{Context, testing, topics};
+use halcyon_model::{CommandReply, FlightMode, VehicleAction, VehicleCommand, VehicleId, VehicleState};
+use halcyon_vehicle_link::{Config, run};
+use mavlink::dialects::ardupilotmega::{MavCmd, MavMessage};
+use mavlink::Message as _;
+
+use peer::{Peer, SYSTEM};
+
+const PATIENCE: Duration = Duration::from_secs(30);
+
+struct Rig {
+    context: Context,
+    peer: Peer,
+    states: halcyon_chassis::Subscriber<VehicleState>,
+    service: tokio::task::JoinHandle<anyhow::Result<()>>,
+}
+
+impl Rig {
+    async fn start(peer: Peer, scheme: &str) -> Self {
+        let context = testing::context("vehicle-link.test").await;
+        let states = context.bus.subscribe(&topics::vehicle_states()).await.unwrap();
+        let endpoint = format!("{scheme}:{}", peer.address);
+        let config = Config { vehicle: "v".into(), role: "follower".into(), endpoint, ..Config::default() };
+        let service = tokio::spawn(run(context.clone(), config));
+        Self { context, peer, states, service }
+    }
+
+    /// The first state for which `wanted` holds.
+    async fn state(&mut self, wanted: impl Fn(&VehicleState) -> bool) -> VehicleState {
+        let search = async {
+            loop {
+                let state = self.states.recv().await.unwrap();
+                if wanted(&state) {
+                    return state;
+                }
+            }
+        };
+        self.context.clock.timeout(PATIENCE, search).await.expect("no such state came")
+    }
+
+    async fn call(&self, action: VehicleAction) -> CommandReply {
+        let now = self.context.clock.now();
+        let vehicle = VehicleId::new("v").unwrap();
+        let command =
+            VehicleCommand { stamp: now, deadline: now + PATIENCE, who: "test".into(), vehicle: vehicle.clone(), action };
+        self.context.bus.call(&topics::vehicle_command(&vehicle), &command, PATIENCE).await.unwrap()
+    }
+
+    /// Waits for a condition, bounded.
+    async fn wait(&mut self, condition: impl Fn(&Peer) -> bool) {
+        let peer = &self.peer;
+        let clock = &self.context.clock;
+        let poll = async {
+            while !condition(peer) {
+                clock.sleep(Duration::from_millis(20)).await;
+            }
+        };
+        clock.timeout(PATIENCE, poll).await.expect("the condition did not come true");
+    }
+
+    async fn stop(self) {
+        self.context.stop.cancel();
+        self.service.await.unwrap().unwrap();
+    }
+}
+
+fn asks_for_streams(message: &MavMessage) -> bool {
+    matches!(message, MavMessage::COMMAND_LONG(data) if data.command == MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL)
+}
+
+async fn finds_it_and_publishes(peer: Peer, scheme: &str) {
+    let mut rig = Rig::start(peer, scheme).await;
+    let state = rig.state(|_| true).await;
+    // The context's origin is at that very place.
+    assert!(state.position_ned_m.norm() < 0.1, "{}", state.position_ned_m);
+    assert!((state.heading_rad - 0.5).abs() < 1e-6);
+    assert!(!state.armed && !state.estimator_ok && !state.ready_to_arm && state.battery_fraction.is_none());
+    rig.wait(|peer| peer.sent(asks_for_streams) >= 9).await;
+    rig.wait(|peer| peer.sent(|message| matches!(message, MavMessage::HEARTBEAT(_))) >= 2).await;
+    let frames = rig.peer.shared.frames.lock().unwrap().clone();
+    for (header, message) in &frames {
+        assert_eq!(header.component_id, 191, "we are the onboard computer");
+        if let Some(target) = message.target_system_id() {
+            assert_eq!(target, SYSTEM, "{message:?}");
+        }
+    }
+    rig.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn over_tcp() {
+    finds_it_and_publishes(Peer::tcp(), "tcpout").await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn over_udp() {
+    finds_it_and_publishes(Peer::udp(), "udpout").await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn commands_are_answered_with_the_autopilots_words() {
+    let mut rig = Rig::start(Peer::tcp(), "tcpout").await;
+    rig.state(|_| true).await;
+    rig.peer.shared.refuse_arming.store(true, Ordering::Relaxed);
+    let reply = rig.call(VehicleAction::Arm).await;
+    assert!(!reply.accepted && reply.reason.contains("PreArm: Compass not calibrated"), "{reply:?}");
+    let reply = rig.call(VehicleAction::Return).await;
+    assert!(!reply.accepted && reply.reason.contains("on the ground"), "{reply:?}");
+    // The first try is not heard; the second is.
+    rig.wait(|peer| peer.sent(asks_for_streams) >= 9).await;
+    rig.peer.shared.deaf_once.store(true, Ordering::Relaxed);
+    let reply = rig.call(VehicleAction::SetMode(FlightMode::Guided)).await;
+    assert!(reply.accepted, "{reply:?}");
+    rig.state(|state| state.mode == FlightMode::Guided).await;
+    let is_mode = |message: &MavMessage| matches!(message, MavMessage::COMMAND_LONG(data) if data.command == MavCmd::MAV_CMD_DO_SET_MODE);
+    assert!(rig.peer.sent(is_mode) >= 2);
+    rig.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_lost_connection_comes_back_and_garbage_does_no_harm() {
+    let mut rig = Rig::start(Peer::tcp(), "tcpout").await;
+    rig.state(|_| true).await;
+    // Noise with false starts of frames of both versions in it.
+    let noise: Vec<u8> = (0..20_000u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 13) as u8).collect();
+    let mut noise = noise;
+    for at in (0..noise.len()).step_by(97) {
+        noise[at] = if at % 2 == 0 { 0xFD } else { 0xFE };
+    }
+    *rig.peer.shared.garbage.lock().unwrap() = noise;
+    rig.peer.set_mode(5);
+    rig.state(|state| state.mode == FlightMode::Loiter).await;
+    rig.peer.shared.hang_up.store(true, Ordering::Relaxed);
+    rig.wait(|peer| *peer.shared.connections.lock().unwrap() == 2).await;
+    rig.peer.set_mode(6);
+    rig.state(|state| state.mode == FlightMode::Rtl).await;
+    rig.stop().await;
+}
