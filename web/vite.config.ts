@@ -11,5 +11,5 @@ export default defineConfig({
     modulePreload: { polyfill: false },
   },
   server: { proxy: { '/api': { target: backend, ws: true }, '/docs': backend, '/openapi.json': backend } },
-  test: { environment: 'node', include: ['src/**/*.test.ts', 'mock/**/*.test.mjs'] },
+  test: { environment: 'node', include: ['src/**/*.test.ts', 'mock/**/*.test.mjs'], css: true },
 });
