@@ -1,0 +1,174 @@
+//! Virtual gauges: spots of water that are read from patch after patch.
+
+use halcyon_model::{ElevationGrid, LocalPoint};
+
+use super::patch::cell;
+
+/// Gauges along each side of the layout.
+const SIDE: usize = 3;
+/// Gauges at work at once.
+pub(crate) const GAUGES: usize = SIDE * SIDE;
+/// The gauge in the middle of the layout.
+pub(crate) const CENTRE: usize = GAUGES / 2;
+/// A gauge that could not be read this many times in a row is moved.
+const MISSES_MAX: u32 = 10;
+
+/// Elevation at a gauge.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Reading {
+    /// Which gauge: a new number each time that a gauge is placed.
+    pub gauge: u64,
+    /// Above the patch's own mean level, metres.
+    pub elevation_m: f64,
+    /// One standard deviation, metres.
+    pub sigma_m: f64,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Gauge {
+    number: u64,
+    place: LocalPoint,
+    misses: u32,
+}
+
+/// Nine gauges in a square over the middle half of the patch. Each stays over its water while the vehicle moves a little, and
+/// is placed anew when it leaves the patch or sees nothing.
+#[derive(Debug, Default)]
+pub(crate) struct Gauges {
+    placed: [Option<Gauge>; GAUGES],
+    next: u64,
+}
+
+impl Gauges {
+    /// Reads every gauge from `grid`.
+    pub(crate) fn read(&mut self, grid: &ElevationGrid) -> [Option<Reading>; GAUGES] {
+        let mut readings = [None; GAUGES];
+        for (slot, reading) in readings.iter_mut().enumerate() {
+            let gauge = match self.placed[slot] {
+                Some(gauge) if gauge.misses <= MISSES_MAX && is_inside(grid, gauge.place) => gauge,
+                _ => {
+                    self.next += 1;
+                    Gauge { number: self.next, place: nominal(grid, slot), misses: 0 }
+                }
+            };
+            let seen = interpolate(grid, gauge.place);
+            *reading = seen.map(|(elevation_m, sigma_m)| Reading { gauge: gauge.number, elevation_m, sigma_m });
+            let misses = if seen.is_some() { 0 } else { gauge.misses + 1 };
+            self.placed[slot] = Some(Gauge { misses, ..gauge });
+        }
+        readings
+    }
+}
+
+/// Where a slot's gauge is placed: at 1/4, 1/2 and 3/4 of the patch, or at the nearest cell with a measurement within an eighth.
+fn nominal(grid: &ElevationGrid, slot: usize) -> LocalPoint {
+    let fraction = |i: usize| (i + 1) as f64 / (SIDE + 1) as f64;
+    let (rows, cols) = (f64::from(grid.rows - 1), f64::from(grid.cols - 1));
+    let (row, col) = (fraction(slot / SIDE) * rows, fraction(slot % SIDE) * cols);
+    let at = |row: f64, col: f64| {
+        LocalPoint::new(grid.south_west_north_m + row * grid.cell_m, grid.south_west_east_m + col * grid.cell_m)
+    };
+    if interpolate(grid, at(row, col)).is_some() {
+        return at(row, col);
+    }
+    let (reach_rows, reach_cols) = ((rows / 8.0).floor() as i64, (cols / 8.0).floor() as i64);
+    let mut best: Option<(i64, f64, f64)> = None;
+    for i in -reach_rows..=reach_rows {
+        for j in -reach_cols..=reach_cols {
+            let (r, c) = (row.round() + i as f64, col.round() + j as f64);
+            let distance = i * i + j * j;
+            if best.is_none_or(|(nearest, ..)| distance < nearest)
+                && r >= 0.0
+                && c >= 0.0
+                && cell(grid, r as usize, c as usize).is_some()
+            {
+                best = Some((distance, r, c));
+            }
+        }
+    }
+    best.map_or_else(|| at(row, col), |(_, row, col)| at(row, col))
+}
+
+/// Row and column of a place, in cells.
+fn row_col(grid: &ElevationGrid, place: LocalPoint) -> (f64, f64) {
+    ((place.north_m - grid.south_west_north_m) / grid.cell_m, (place.east_m - grid.south_west_east_m) / grid.cell_m)
+}
+
+fn is_inside(grid: &ElevationGrid, place: LocalPoint) -> bool {
+    let (row, col) = row_col(grid, place);
+    (0.0..=f64::from(grid.rows - 1)).contains(&row) && (0.0..=f64::from(grid.cols - 1)).contains(&col)
+}
+
+/// Bilinear elevation at a place and its standard deviation; `None` where less than half of the weight was seen.
+///
+/// Neighbouring cells share pixels, so their errors are taken as common: averaging them gains nothing.
+fn interpolate(grid: &ElevationGrid, place: LocalPoint) -> Option<(f64, f64)> {
+    if !is_inside(grid, place) {
+        return None;
+    }
+    let (row, col) = row_col(grid, place);
+    let (row0, col0) = (row.floor(), col.floor());
+    let (mut weight, mut elevation, mut variance) = (0.0, 0.0, 0.0);
+    for (i, row_weight) in [(0, 1.0 - (row - row0)), (1, row - row0)] {
+        for (j, col_weight) in [(0, 1.0 - (col - col0)), (1, col - col0)] {
+            let w = row_weight * col_weight;
+            let (r, c) = (row0 as usize + i, col0 as usize + j);
+            if w > 0.0
+                && r < grid.rows as usize
+                && c < grid.cols as usize
+                && let Some((elevation_m, sigma_m)) = cell(grid, r, c)
+            {
+                weight += w;
+                elevation += w * elevation_m;
+                variance += w * sigma_m * sigma_m;
+            }
+        }
+    }
+    (weight >= 0.5).then(|| (elevation / weight, (variance / weight).sqrt()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grid(north_m: f64, f: impl Fn(f64, f64) -> f32) -> ElevationGrid {
+        let (rows, cols, cell_m) = (21_u32, 31_u32, 0.1);
+        let elevation_m = (0..rows * cols)
+            .map(|i| f(north_m + f64::from(i / cols) * cell_m, f64::from(i % cols) * cell_m))
+            .collect::<Vec<_>>();
+        let sigma_m = vec![0.002; elevation_m.len()];
+        ElevationGrid { south_west_north_m: north_m, south_west_east_m: 0.0, cell_m, rows, cols, elevation_m, sigma_m }
+    }
+
+    #[test]
+    fn a_gauge_stays_over_its_water_and_ends_with_the_patch() {
+        let plane = |n: f64, e: f64| (0.3 * n - 0.2 * e) as f32;
+        let mut gauges = Gauges::default();
+        let first = gauges.read(&grid(0.0, plane));
+        let moved = gauges.read(&grid(0.43, plane));
+        for (a, b) in first.iter().zip(&moved) {
+            let (a, b) = (a.unwrap(), b.unwrap());
+            assert_eq!(a.gauge, b.gauge);
+            assert!((a.elevation_m - b.elevation_m).abs() < 1e-6);
+        }
+        // One metre north: the southern three (at 0.5 m) are left behind, the others stay.
+        let further = gauges.read(&grid(1.0, plane));
+        let kept = first.iter().zip(&further).filter(|(a, b)| a.unwrap().gauge == b.unwrap().gauge).count();
+        assert_eq!(kept, 6);
+    }
+
+    #[test]
+    fn holes_are_no_readings() {
+        let mut gauges = Gauges::default();
+        assert!(gauges.read(&grid(0.0, |_, _| f32::NAN)).iter().all(Option::is_none));
+        // Nothing in the northern half: the three gauges there see nothing, and none is made up.
+        let half = gauges.read(&grid(0.0, |n, _| if n > 1.25 { f32::NAN } else { 0.01 }));
+        assert_eq!(half.iter().filter(|r| r.is_some()).count(), 6);
+        // A hole just at the centre: after a while its gauge moves to the nearest water in sight.
+        let hole = |n: f64, e: f64| if (n - 1.0).abs() < 0.15 && (e - 1.5).abs() < 0.15 { f32::NAN } else { 0.01 };
+        for _ in 0..=MISSES_MAX + 1 {
+            gauges.read(&grid(0.0, hole));
+        }
+        assert!(gauges.read(&grid(0.0, hole))[CENTRE].is_some());
+    }
+}

@@ -1,0 +1,24 @@
+//! The domain: patches in, sea states out.
+//!
+//! | noun | is |
+//! |---|---|
+//! | gauge | a spot of water, fixed in the local frame, whose elevation is read from every patch that covers it |
+//! | frame | what is kept of one patch: the gauges' readings, slope, level, coverage |
+//! | window | the frames of the last while over the same spot |
+//! | series | one gauge's elevation over the window, broken where patches are missing |
+//! | hidden part | waves longer than the footprint: a patch's own mean level takes them out of its grid |
+//!
+//! Nothing here knows the bus, the disk or a clock: `now` is an argument.
+
+mod assessor;
+mod gauge;
+mod hidden;
+mod patch;
+mod sampling;
+mod series;
+mod statistics;
+mod verdict;
+mod window;
+
+pub use assessor::Assessor;
+pub use patch::PatchError;

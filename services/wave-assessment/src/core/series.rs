@@ -1,0 +1,210 @@
+//! Elevation series at the gauges.
+
+use halcyon_model::{Stamp, TracePoint};
+
+use super::gauge::{CENTRE, GAUGES};
+use super::hidden::Hidden;
+use super::window::Window;
+
+/// Shorter stretches at one gauge are left out, seconds: their mean takes too much of the waves away.
+const STRETCH_S_MIN: f64 = 10.0;
+/// Fewer samples than this are no stretch.
+const SAMPLES_MIN: usize = 12;
+/// Outliers: this many standard deviations from the mean (thesis 7.3) …
+const OUTLIER_SIGMAS: f64 = 3.0;
+/// … that also stand out from both neighbours by this many.
+const OUTLIER_JUMP_SIGMAS: f64 = 2.5;
+
+/// An unbroken series at one gauge, without its mean.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Stretch {
+    /// The gauge's place in the layout.
+    pub slot: usize,
+    /// Seconds since the window's first frame, rising.
+    pub times_s: Vec<f64>,
+    /// Best estimate of the elevation, metres.
+    pub elevation_m: Vec<f64>,
+    /// The same with all that may be hidden waves in it, metres.
+    pub elevation_upper_m: Vec<f64>,
+}
+
+impl Stretch {
+    fn duration_s(&self) -> f64 {
+        self.times_s.last().copied().unwrap_or(0.0) - self.times_s.first().copied().unwrap_or(0.0)
+    }
+}
+
+/// Every gauge's series over the window.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Series {
+    pub stretches: Vec<Stretch>,
+    /// Samples in all stretches.
+    pub samples: usize,
+    /// How many of them were replaced.
+    pub replaced: usize,
+    /// Mean variance of the readings' own errors, m².
+    pub noise_m2: f64,
+    /// The longest that one gauge was observed, seconds.
+    pub observed_s: f64,
+    start: Stamp,
+}
+
+impl Series {
+    /// From the frames of a window. A longer gap than `gap_s` breaks a series.
+    pub(crate) fn new(window: &Window, hidden: &Hidden, gap_s: f64) -> Self {
+        let frames = window.frames();
+        let start = frames.front().map_or_else(Stamp::default, |f| f.stamp);
+        let mut series = Self { stretches: Vec::new(), samples: 0, replaced: 0, noise_m2: 0.0, observed_s: 0.0, start };
+        for slot in 0..GAUGES {
+            // (frame, seconds, grid, hidden) of what can be used, gauge after gauge.
+            let mut of_gauge: Vec<(u64, Vec<(usize, f64)>)> = Vec::new();
+            for (i, frame) in frames.iter().enumerate() {
+                let Some(reading) = frame.readings[slot] else { continue };
+                if matches!(hidden, Hidden::Measured { level_m, .. } if level_m[i].is_none()) {
+                    continue;
+                }
+                let point = (i, frame.stamp.seconds_since(start));
+                match of_gauge.last_mut() {
+                    Some((gauge, points)) if *gauge == reading.gauge => points.push(point),
+                    _ => of_gauge.push((reading.gauge, vec![point])),
+                }
+            }
+            let mut observed_s = 0.0;
+            for (_, points) in &of_gauge {
+                for run in runs(points, gap_s) {
+                    observed_s += series.add(window, hidden, slot, run);
+                }
+            }
+            series.observed_s = series.observed_s.max(observed_s);
+        }
+        if series.samples > 0 {
+            series.noise_m2 /= series.samples as f64;
+        }
+        series
+    }
+
+    /// Adds one run of readings; returns its length in seconds, 0 where it is too short.
+    fn add(&mut self, window: &Window, hidden: &Hidden, slot: usize, run: &[(usize, f64)]) -> f64 {
+        let mut stretch = Stretch { slot, times_s: Vec::new(), elevation_m: Vec::new(), elevation_upper_m: Vec::new() };
+        let mut noise_m2 = 0.0;
+        for (i, time_s) in run {
+            let Some(reading) = window.frames()[*i].readings[slot] else { continue };
+            let (level_m, gain) = match hidden {
+                Hidden::Measured { level_m, gain, .. } => (level_m[*i].unwrap_or(0.0), *gain),
+                Hidden::Unknown => (0.0, 0.0),
+            };
+            stretch.times_s.push(*time_s);
+            stretch.elevation_m.push(reading.elevation_m + gain * level_m);
+            stretch.elevation_upper_m.push(reading.elevation_m + level_m);
+            noise_m2 += reading.sigma_m * reading.sigma_m;
+        }
+        let duration_s = stretch.duration_s();
+        if duration_s < STRETCH_S_MIN || stretch.times_s.len() < SAMPLES_MIN {
+            return 0.0;
+        }
+        self.replaced += despike(&mut stretch.elevation_m, &mut stretch.elevation_upper_m);
+        center(&mut stretch.elevation_m);
+        center(&mut stretch.elevation_upper_m);
+        self.samples += stretch.times_s.len();
+        self.noise_m2 += noise_m2;
+        self.stretches.push(stretch);
+        duration_s
+    }
+
+    /// The series at the centre of the patch, oldest first.
+    pub(crate) fn trace(&self) -> Vec<TracePoint> {
+        let mut trace: Vec<TracePoint> = self
+            .stretches
+            .iter()
+            .filter(|s| s.slot == CENTRE)
+            .flat_map(|s| s.times_s.iter().zip(&s.elevation_m))
+            .map(|(time_s, elevation_m)| TracePoint { stamp: self.start.plus_secs_f64(*time_s), elevation_m: *elevation_m })
+            .collect();
+        trace.sort_by_key(|point| point.stamp);
+        trace
+    }
+}
+
+fn center(values: &mut [f64]) {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    values.iter_mut().for_each(|x| *x -= mean);
+}
+
+/// Splits (anything, seconds) points, in order of time, where two are more than `gap_s` apart.
+pub(crate) fn runs(points: &[(usize, f64)], gap_s: f64) -> impl Iterator<Item = &[(usize, f64)]> {
+    // A hair more than the gap: stamps are rounded to nanoseconds.
+    points.chunk_by(move |a, b| b.1 - a.1 <= gap_s + 1e-6)
+}
+
+/// Replaces outliers in `values` by the mean of their neighbours, and the same samples in `also` (as long, or empty); returns how many.
+///
+/// The thesis (7.3) takes everything beyond three standard deviations from the mean. Of a Gaussian sea that is one honest sample in
+/// 370, and always the top of the highest waves, the very ones that matter here. So a sample must also stand out from both its
+/// neighbours, as a failed match does and a wave does not. Deviations are estimated from the median absolute one, which outliers
+/// do not inflate.
+pub(crate) fn despike(values: &mut [f64], also: &mut [f64]) -> usize {
+    let n = values.len();
+    if n < 3 {
+        return 0;
+    }
+    let center = median(values.to_vec());
+    let sigma = 1.4826 * median(values.iter().map(|x| (x - center).abs()).collect());
+    if sigma <= 0.0 {
+        return 0;
+    }
+    let is_far = |x: f64| (x - center).abs() > OUTLIER_SIGMAS * sigma;
+    let original = values.to_vec();
+    let mut replaced = 0;
+    for i in 0..n {
+        let neighbours = [i.checked_sub(1), Some(i + 1).filter(|j| *j < n)];
+        let stands_out = neighbours.iter().flatten().all(|j| (original[i] - original[*j]).abs() > OUTLIER_JUMP_SIGMAS * sigma);
+        if is_far(original[i]) && stands_out {
+            for series in [&mut *values, &mut *also] {
+                if series.len() == n {
+                    let (sum, count) = neighbours.iter().flatten().fold((0.0, 0.0), |(s, c), j| (s + series[*j], c + 1.0));
+                    series[i] = sum / count;
+                }
+            }
+            replaced += 1;
+        }
+    }
+    replaced
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spikes_go_and_high_waves_stay() {
+        let wave = |i: usize| (i as f64 * 1.2).sin() * if (60..66).contains(&i) { 2.6 } else { 0.8 };
+        let clean: Vec<f64> = (0..300).map(wave).collect();
+        let mut values = clean.clone();
+        assert_eq!(despike(&mut values, &mut []), 0, "a group of waves three times as high as the others is no outlier");
+        for i in [40, 100, 101 + 40, 299] {
+            values[i] += 9.0;
+        }
+        let mut also = values.clone();
+        assert_eq!(despike(&mut values, &mut also), 4);
+        assert!(values.iter().all(|x| x.abs() < 3.0) && also.iter().all(|x| x.abs() < 3.0));
+    }
+
+    #[test]
+    fn still_water_has_no_outliers() {
+        assert_eq!(despike(&mut [0.0; 20], &mut []), 0);
+        assert_eq!(despike(&mut [1.0, 2.0], &mut []), 0);
+        assert_eq!(despike(&mut [], &mut []), 0);
+    }
+
+    #[test]
+    fn gaps_break_runs() {
+        let points = [(0, 0.0), (1, 0.2), (2, 0.4), (3, 1.2), (4, 1.4)];
+        let lengths: Vec<usize> = runs(&points, 0.5).map(<[_]>::len).collect();
+        assert_eq!(lengths, [3, 2]);
+    }
+}

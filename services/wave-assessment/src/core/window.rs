@@ -1,0 +1,166 @@
+//! The frames of the last while over the same water.
+
+use std::collections::VecDeque;
+use std::hash::{Hash, Hasher};
+
+use halcyon_model::{ElevationGrid, LocalPoint, Stamp, SurfacePatch};
+
+use super::gauge::{GAUGES, Gauges, Reading};
+use super::patch::cell;
+
+/// Never more frames than this, whatever the rate: the oldest go first.
+const FRAMES_MAX: usize = 4096;
+
+/// Mean square slope of one patch.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Slope {
+    /// Sum of the two directions' mean squares.
+    pub mean_square: f64,
+    /// What the cells' errors alone would make of it.
+    pub noise: f64,
+}
+
+/// What is kept of one patch.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Frame {
+    pub stamp: Stamp,
+    pub centre: LocalPoint,
+    pub coverage: f64,
+    /// The patch's shorter side, metres.
+    pub footprint_m: f64,
+    pub readings: [Option<Reading>; GAUGES],
+    pub slope: Option<Slope>,
+    /// Level by the autopilot, metres, and its standard deviation where stated.
+    pub level_m: Option<f64>,
+    pub level_sigma_m: Option<f64>,
+    /// Distance from the camera to the mean plane, metres.
+    pub distance_m: f64,
+    /// Whether the grid is, bit for bit, the one before: a source that repeats itself measures nothing.
+    pub frozen: bool,
+}
+
+/// Frames, oldest first.
+#[derive(Debug, Default)]
+pub(crate) struct Window {
+    frames: VecDeque<Frame>,
+    gauges: Gauges,
+    fingerprint: Option<u64>,
+}
+
+impl Window {
+    /// Adds a checked patch that is newer than all before, and drops what is older than `window_s` or further than
+    /// `spot_radius_m` from it.
+    pub(crate) fn add(&mut self, patch: &SurfacePatch, window_s: f64, spot_radius_m: f64, slope_baseline_m: f64) {
+        let grid = &patch.grid;
+        let (height_m, width_m) = (f64::from(grid.rows - 1) * grid.cell_m, f64::from(grid.cols - 1) * grid.cell_m);
+        let centre = LocalPoint::new(grid.south_west_north_m + 0.5 * height_m, grid.south_west_east_m + 0.5 * width_m);
+        let (seen, fingerprint) = survey(grid);
+        let frame = Frame {
+            stamp: patch.stamp,
+            centre,
+            // A patch cannot cover more than its grid shows.
+            coverage: patch.coverage.min(seen),
+            footprint_m: height_m.min(width_m) + grid.cell_m,
+            readings: self.gauges.read(grid),
+            slope: slope(grid, slope_baseline_m),
+            level_m: patch.level_m,
+            level_sigma_m: patch.level_sigma_m,
+            distance_m: patch.plane.distance_m,
+            frozen: fingerprint.is_some() && fingerprint == self.fingerprint,
+        };
+        self.fingerprint = fingerprint;
+        self.frames
+            .retain(|old| patch.stamp.seconds_since(old.stamp) <= window_s && old.centre.distance_m(&centre) <= spot_radius_m);
+        if self.frames.len() >= FRAMES_MAX {
+            self.frames.pop_front();
+        }
+        self.frames.push_back(frame);
+    }
+
+    pub(crate) fn frames(&self) -> &VecDeque<Frame> {
+        &self.frames
+    }
+
+    pub(crate) fn newest(&self) -> Option<&Frame> {
+        self.frames.back()
+    }
+
+    pub(crate) fn clear(&mut self) {
+        *self = Self::default();
+    }
+
+    /// The usual interval between frames, seconds: the median; `None` with fewer than two.
+    pub(crate) fn interval_s(&self) -> Option<f64> {
+        let mut steps: Vec<f64> =
+            self.frames.iter().zip(self.frames.iter().skip(1)).map(|(a, b)| b.stamp.seconds_since(a.stamp)).collect();
+        let middle = steps.len() / 2;
+        (!steps.is_empty()).then(|| *steps.select_nth_unstable_by(middle, f64::total_cmp).1)
+    }
+}
+
+/// Share of cells with a measurement, and a hash of them; no hash where there is none.
+fn survey(grid: &ElevationGrid) -> (f64, Option<u64>) {
+    let mut hasher = std::hash::DefaultHasher::new();
+    let mut seen = 0_usize;
+    for (elevation_m, sigma_m) in grid.elevation_m.iter().zip(&grid.sigma_m) {
+        let measured = elevation_m.is_finite() && sigma_m.is_finite();
+        seen += usize::from(measured);
+        if measured { elevation_m.to_bits() } else { u32::MAX }.hash(&mut hasher);
+    }
+    (seen as f64 / grid.elevation_m.len() as f64, (seen > 0).then(|| hasher.finish()))
+}
+
+/// Mean square slope between cells about `baseline_m` apart, over all pairs seen; `None` without a pair in both directions.
+fn slope(grid: &ElevationGrid, baseline_m: f64) -> Option<Slope> {
+    let (rows, cols) = (grid.rows as usize, grid.cols as usize);
+    let step = ((baseline_m / grid.cell_m).round().max(1.0) as usize).min(rows.min(cols) - 1);
+    let run_m = step as f64 * grid.cell_m;
+    let (mut mean_square, mut noise) = (0.0, 0.0);
+    for (row_step, col_step) in [(step, 0), (0, step)] {
+        let (mut squares, mut variances, mut pairs) = (0.0, 0.0, 0_u32);
+        for row in 0..rows - row_step {
+            for col in 0..cols - col_step {
+                if let (Some((a_m, a_sigma_m)), Some((b_m, b_sigma_m))) =
+                    (cell(grid, row, col), cell(grid, row + row_step, col + col_step))
+                {
+                    squares += (b_m - a_m).powi(2);
+                    variances += a_sigma_m.powi(2) + b_sigma_m.powi(2);
+                    pairs += 1;
+                }
+            }
+        }
+        if pairs == 0 {
+            return None;
+        }
+        mean_square += squares / (f64::from(pairs) * run_m * run_m);
+        noise += variances / (f64::from(pairs) * run_m * run_m);
+    }
+    Some(Slope { mean_square, noise })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grid(f: impl Fn(f64, f64) -> f32) -> ElevationGrid {
+        let elevation_m: Vec<f32> = (0..40 * 50).map(|i| f(f64::from(i / 50) * 0.1, f64::from(i % 50) * 0.1)).collect();
+        let sigma_m = vec![0.003; elevation_m.len()];
+        ElevationGrid { south_west_north_m: 0.0, south_west_east_m: 0.0, cell_m: 0.1, rows: 40, cols: 50, elevation_m, sigma_m }
+    }
+
+    #[test]
+    fn the_slope_of_a_plane_is_its_slope() {
+        let slope = slope(&grid(|n, e| (0.03 * n + 0.04 * e) as f32), 0.4).unwrap();
+        assert!((slope.mean_square.sqrt() - 0.05).abs() < 1e-5);
+        // Two cells of 3 mm each over 0.4 m, in two directions.
+        assert!((slope.noise - 2.0 * 2.0 * (0.003f64 / 0.4).powi(2)).abs() < 1e-8);
+        assert_eq!(super::slope(&grid(|_, _| f32::NAN), 0.4), None);
+    }
+
+    #[test]
+    fn coverage_is_what_was_seen() {
+        let (seen, hash) = survey(&grid(|n, _| if n < 1.95 { 0.0 } else { f32::NAN }));
+        assert!((seen - 0.5).abs() < 1e-9 && hash.is_some());
+        assert_eq!(survey(&grid(|_, _| f32::NAN)), (0.0, None));
+    }
+}
