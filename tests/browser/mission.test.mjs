@@ -29,6 +29,8 @@ test('a mission from the form to the landing', { timeout: 4 * STEP_MS }, async (
   await page.locator('.vehicle.leader').first().waitFor({ timeout: STEP_MS });
   await page.locator('.vehicle.follower').first().waitFor({ timeout: STEP_MS });
 
+  await get('operator').fill('Story tester');
+
   // What is wrong in the form is said at its field, and nothing is sent.
   if (!(await get('create-form').isVisible())) await get('new-mission').click();
   await get('north').fill('far away');
@@ -79,7 +81,7 @@ test('a mission from the form to the landing', { timeout: 4 * STEP_MS }, async (
   const listed = (await answer.json()).items.find((one) => one.id === id);
   assert.equal(listed?.phase, 'completed', 'the page and the API agree');
   await page.locator(`[data-testid="vehicle-${listed.follower}"][data-activity=landed]`).waitFor({ timeout: STEP_MS });
-  for (const word of ['Waiting for approval', 'Follower is landing', 'Follower has landed']) {
+  for (const word of ['Waiting for approval', 'Story tester', 'Follower is landing', 'Follower has landed']) {
     assert.ok((await get('transitions').innerText()).includes(word), `the history tells of "${word}"`);
   }
 

@@ -16,7 +16,7 @@ const PERIOD_MS = 100;
 
 /** Starts a mock on a free port unless one is given; resolves to its address and what stops it. */
 export async function startMock({ port = 0, speed = 1, ...options } = {}) {
-  const world = new World(options);
+  const world = new World({ ...options, speed });
   const server = createServer((request, response) => void answer(world, request, response));
   const sockets = new WebSocketServer({ noServer: true });
   server.on('upgrade', (request, socket, head) => {
@@ -79,13 +79,14 @@ async function answer(world, request, response) {
   const problem = (status, detail) => json(status, { type: `urn:halcyon:problem:${status}`, title: detail, status, detail, instance: pathname });
   const command = /^\/api\/v1\/missions(?:\/([\w.-]+)\/(\w+))?$/.exec(pathname);
   if (request.method === 'POST' && command) {
+    const who = request.headers['halcyon-operator'] ?? 'api';
     let body;
     try {
       body = command[1] ? {} : JSON.parse(await text(request));
     } catch {
       return problem(400, 'the body is not JSON');
     }
-    const result = command[1] ? world.command(command[1], command[2]) : world.create(body);
+    const result = command[1] ? world.command(command[1], command[2], who) : world.create(body, who);
     if (result.status >= 400) return problem(result.status, result.detail);
     const watch = `/api/v1/missions/${result.mission}`;
     return json(202, { stamp: world.stamp(), accepted: true, reason: 'done', mission: result.mission, watch });

@@ -29,7 +29,8 @@ const ahead = (from, heading_deg, forward_m, right_m) => {
 };
 
 export class World {
-  constructor({ followers = 2, h_s_m = 0.05, start_ms = Date.now(), empty = false } = {}) {
+  constructor({ followers = 2, h_s_m = 0.05, start_ms = Date.now(), empty = false, speed = 1 } = {}) {
+    this.speed = speed;
     this.h_s_m = h_s_m;
     this.now_ms = start_ms;
     this.begun_ms = start_ms;
@@ -162,7 +163,7 @@ export class World {
   }
 
   /** Answers like the gateway: `{ status, body }`. */
-  create(body) {
+  create(body, who = 'dashboard') {
     const given = body?.point ?? {};
     const local = 'latitude_deg' in given ? fromGlobal(given) : given;
     if (!Number.isFinite(local.north_m) || !Number.isFinite(local.east_m)) return { status: 400, detail: 'a point has latitude_deg and longitude_deg, or north_m and east_m' };
@@ -173,26 +174,26 @@ export class World {
       touchdown: null, history: [],
     };
     this.missions.set(id, mission);
-    this.to(mission, 'waiting', 'created', 'dashboard');
+    this.to(mission, 'waiting', 'created', who);
     return { status: 202, mission: id };
   }
 
-  command(id, action) {
+  command(id, action, who = 'dashboard') {
     const mission = this.missions.get(id);
     if (!mission) return { status: 404, detail: `no mission ${id}` };
     const possible = can(mission)[action];
     if (!possible) return { status: 404, detail: `no action ${action}` };
     if (!possible.allowed) return { status: 409, detail: possible.why };
-    if (action === 'approve' || action === 'dispatch') this.to(mission, 'approved', 'approved by a person', 'dashboard');
+    if (action === 'approve' || action === 'dispatch') this.to(mission, 'approved', 'approved by a person', who);
     if (action === 'pause') {
       mission.resumeTo = mission.phase;
-      this.to(mission, 'paused', 'paused by a person', 'dashboard');
+      this.to(mission, 'paused', 'paused by a person', who);
     }
-    if (action === 'resume') this.to(mission, mission.resumeTo, 'resumed by a person', 'dashboard');
+    if (action === 'resume') this.to(mission, mission.resumeTo, 'resumed by a person', who);
     if (action === 'abort') {
       this.home(this.vehicle(mission.leader));
       this.home(this.vehicle(mission.follower));
-      this.to(mission, 'aborted', 'aborted by a person', 'dashboard');
+      this.to(mission, 'aborted', 'aborted by a person', who);
     }
     return { status: 202, mission: id };
   }
@@ -294,6 +295,6 @@ export class World {
   }
 
   hello() {
-    return { api: 'v1', version: 'mock', fleet: 'mock', origin: ORIGIN, now: this.stamp() };
+    return { api: 'v1', version: 'mock', fleet: 'mock', origin: ORIGIN, now: this.stamp(), speed: this.speed };
   }
 }

@@ -1,5 +1,6 @@
 /** REST, version 1. Every failure becomes one {@link ApiError} with a sentence for people. */
 import { randomId } from '../lib/id';
+import { operator, operatorHeader } from '../lib/operator';
 import type { CommandResult, CreateMission, Preview, Problem } from './types';
 
 /** Why a request failed. `message` can be shown as it is. */
@@ -37,7 +38,11 @@ async function request<T>(path: string, init: RequestInit): Promise<T> {
 const post = <T>(path: string, body?: unknown): Promise<T> =>
   request<T>(path, {
     method: 'POST',
-    headers: { 'idempotency-key': randomId(), ...(body === undefined ? {} : { 'content-type': 'application/json' }) },
+    headers: {
+      'idempotency-key': randomId(),
+      'halcyon-operator': operatorHeader(operator.peek()),
+      ...(body === undefined ? {} : { 'content-type': 'application/json' }),
+    },
     ...(body === undefined ? {} : { body: JSON.stringify(body) }),
   });
 

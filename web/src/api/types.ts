@@ -245,6 +245,7 @@ export interface Hello {
   fleet: string;
   origin: Global;
   now: Stamp;
+  speed: number;
 }
 
 export interface Heartbeat {

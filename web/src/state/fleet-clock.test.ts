@@ -10,6 +10,12 @@ it('runs on at the rate that it saw', () => {
   expect(fleetTime_ms(clock, 5500)).toBeCloseTo(1_100_000 + 10_000, 6);
 });
 
+it('runs at the nominal rate until it knows better', () => {
+  const clock = observe({ ...UNSET_CLOCK, nominal: 8 }, 1000, 0);
+  expect(fleetTime_ms(clock, 100)).toBe(1800);
+  expect(rate(observe(clock, 5000, 1000))).toBe(4);
+});
+
 it('never runs slower than the wall, so that nothing looks fresher than it is', () => {
   const clock = observe(observe(UNSET_CLOCK, 0, 0), 100, 1000);
   expect(rate(clock)).toBe(1);

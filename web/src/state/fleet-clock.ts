@@ -7,9 +7,11 @@
 /** Readings, oldest first. Immutable. */
 export interface FleetClock {
   readings: readonly { fleet_ms: number; wall_ms: number }[];
+  /** How fast it is meant to run; holds until the readings tell how fast it does. */
+  nominal: number;
 }
 
-export const UNSET_CLOCK: FleetClock = { readings: [] };
+export const UNSET_CLOCK: FleetClock = { readings: [], nominal: 1 };
 
 /** Readings older than this no longer count for the rate. */
 const WINDOW_MS = 10_000;
@@ -18,15 +20,15 @@ const WINDOW_MS = 10_000;
 export function observe(clock: FleetClock, fleet_ms: number, wall_ms: number): FleetClock {
   const last = clock.readings.at(-1);
   // The fleet's clock jumped back (a simulation began anew): the old readings mean nothing.
-  if (last !== undefined && fleet_ms < last.fleet_ms) return { readings: [{ fleet_ms, wall_ms }] };
-  return { readings: [...clock.readings.filter((reading) => wall_ms - reading.wall_ms < WINDOW_MS), { fleet_ms, wall_ms }].slice(-30) };
+  if (last !== undefined && fleet_ms < last.fleet_ms) return { ...clock, readings: [{ fleet_ms, wall_ms }] };
+  return { ...clock, readings: [...clock.readings.filter((reading) => wall_ms - reading.wall_ms < WINDOW_MS), { fleet_ms, wall_ms }].slice(-30) };
 }
 
 /** Fleet seconds per second of the wall, at least 1. */
 export function rate(clock: FleetClock): number {
   const first = clock.readings[0];
   const last = clock.readings.at(-1);
-  if (first === undefined || last === undefined || last.wall_ms - first.wall_ms < 500) return 1;
+  if (first === undefined || last === undefined || last.wall_ms - first.wall_ms < 500) return Math.max(1, clock.nominal);
   return Math.max(1, (last.fleet_ms - first.fleet_ms) / (last.wall_ms - first.wall_ms));
 }
 

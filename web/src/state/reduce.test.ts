@@ -6,7 +6,7 @@ import { EMPTY, EVENTS_MAX, reduce, type FleetState } from './reduce';
 const after = (...messages: Parsed[]): FleetState => messages.reduce((state, message, i) => reduce(state, message, i), EMPTY);
 const hello: Parsed = {
   type: 'hello',
-  data: { api: 'v1', version: '0.1.0', fleet: 'test', origin: { latitude_deg: 60, longitude_deg: 24, altitude_m: 0 }, now: stamp(0) },
+  data: { api: 'v1', version: '0.1.0', fleet: 'test', origin: { latitude_deg: 60, longitude_deg: 24, altitude_m: 0 }, now: stamp(0), speed: 1 },
 };
 
 describe('what the page knows', () => {

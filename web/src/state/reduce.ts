@@ -46,7 +46,7 @@ export const EMPTY: FleetState = {
 export function reduce(state: FleetState, message: Parsed, heard_ms: number): FleetState {
   switch (message.type) {
     case 'hello':
-      return { ...EMPTY, refused: state.refused, hello: message.data, clock: observe(UNSET_CLOCK, Date.parse(message.data.now), heard_ms) };
+      return { ...EMPTY, refused: state.refused, hello: message.data, clock: observe({ ...UNSET_CLOCK, nominal: Number.isFinite(message.data.speed) ? message.data.speed : 1 }, Date.parse(message.data.now), heard_ms) };
     case 'heartbeat':
       return { ...state, clock: observe(state.clock, Date.parse(message.data.now), heard_ms) };
     case 'vehicle':

@@ -1,5 +1,6 @@
 /** Whose page this is, whether it is in touch, and what time it is for the fleet. */
 import { age, countdown, timeOfDay } from '../lib/format';
+import { operator } from '../lib/operator';
 import { nextTheme, themeChoice } from '../lib/theme';
 import { rate } from '../state/fleet-clock';
 import type { LinkPhase } from '../state/link';
@@ -23,6 +24,11 @@ export function TopBar() {
       <span class="fleet-name">{hello.value === null ? '' : hello.value.fleet}</span>
       <span class="grow" />
       {speed > 1.2 && phase.value === 'live' && <span class="speed" title="Simulated time runs faster than the wall clock">× {speed.toFixed(speed < 9.5 ? 1 : 0)}</span>}
+      <label class="operator" title="Who commands, for the record">
+        <Icon name="person" size={17} />
+        <span class="hidden">Your name, for the record</span>
+        <input value={operator.value} placeholder="Your name" maxLength={64} autocomplete="nickname" onInput={(event) => (operator.value = event.currentTarget.value)} data-testid="operator" />
+      </label>
       <span class="clock" title="The fleet's clock"><Icon name="clock" size={16} />{phase.value === 'live' ? timeOfDay(fleetNow_ms.value) : '–'}</span>
       <span class={`link-state ${phase.value}`} role="status" data-testid="link" data-phase={phase.value}>
         <i class="dot" aria-hidden="true" />{LINK_TEXT[phase.value]}
