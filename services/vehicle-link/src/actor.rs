@@ -71,12 +71,7 @@ struct Service<'a> {
 }
 
 impl<'a> Service<'a> {
-    fn new(
-        context: &'a Context,
-        config: &Config,
-        vehicle: VehicleId,
-        states: Publisher<VehicleState>,
-    ) -> anyhow::Result<Self> {
+    fn new(context: &'a Context, config: &Config, vehicle: VehicleId, states: Publisher<VehicleState>) -> anyhow::Result<Self> {
         let executor = Executor::new(ExecutorConfig {
             vehicle: vehicle.clone(),
             limits: config.limits.clone(),
@@ -126,7 +121,9 @@ impl<'a> Service<'a> {
                     info!(vehicle = %self.vehicle, "autopilot: {text}");
                     self.executor.observe_text(&text, now);
                 }
-                if heard.state && let Some((state, mode_heard)) = self.autopilot.state(now) {
+                if heard.state
+                    && let Some((state, mode_heard)) = self.autopilot.state(now)
+                {
                     self.executor.observe_self(state, mode_heard, now);
                 }
             }
@@ -195,9 +192,7 @@ impl<'a> Service<'a> {
                 warn!(vehicle = %self.vehicle, who = incoming.command.who, why, "command refused");
                 CommandReply::refused(now, why)
             }
-            Decision::Ask(_) if self.waiting.len() >= WAITING_MAX => {
-                CommandReply::refused(now, CommandError::Busy.to_string())
-            }
+            Decision::Ask(_) if self.waiting.len() >= WAITING_MAX => CommandReply::refused(now, CommandError::Busy.to_string()),
             Decision::Ask(command) => {
                 let ticket = self.next_ticket;
                 self.next_ticket += 1;

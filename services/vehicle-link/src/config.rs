@@ -80,7 +80,9 @@ impl Section for Config {
         self.fail_safe.validate()?;
         let (fence_m, safe_m) = (self.fail_safe.fence_height_m, self.limits.safe_height_m.max(self.limits.return_height_m));
         if fence_m < safe_m + 2.0 {
-            return Err(format!("fail_safe.fence_height_m must be 2 m above the safe and return heights ({safe_m}), not {fence_m}"));
+            return Err(format!(
+                "fail_safe.fence_height_m must be 2 m above the safe and return heights ({safe_m}), not {fence_m}"
+            ));
         }
         Ok(())
     }
@@ -113,7 +115,8 @@ mod tests {
             let problem = config.validate().unwrap_err();
             assert!(problem.contains(expected) && !problem.contains('\n'), "{problem}");
         };
-        for bad in ["", "tcpout", "tcpout:host", "tcpout:host:0", "udpin::1", "serial:/dev/x:fast", "file:x:1", "udpbcast:1:1"] {
+        for bad in ["", "tcpout", "tcpout:host", "tcpout:host:0", "udpin::1", "serial:/dev/x:fast", "file:x:1", "udpbcast:1:1"]
+        {
             check(Config { endpoint: bad.into(), ..Config::default() }, "endpoint must be");
         }
         for good in ["tcpout:[::1]:5760", "udpin:0.0.0.0:14550", "serial:/dev/ttyACM0:57600", "tcpin:127.0.0.1:0"] {

@@ -8,8 +8,8 @@ use std::time::Duration;
 use halcyon_chassis::{Context, testing, topics};
 use halcyon_model::{CommandReply, FlightMode, VehicleAction, VehicleCommand, VehicleId, VehicleState};
 use halcyon_vehicle_link::{Config, run};
-use mavlink::dialects::ardupilotmega::{MavCmd, MavMessage};
 use mavlink::Message as _;
+use mavlink::dialects::ardupilotmega::{MavCmd, MavMessage};
 
 use peer::{Peer, SYSTEM};
 
@@ -119,7 +119,8 @@ async fn commands_are_answered_with_the_autopilots_words() {
     let reply = rig.call(VehicleAction::SetMode(FlightMode::Guided)).await;
     assert!(reply.accepted, "{reply:?}");
     rig.state(|state| state.mode == FlightMode::Guided).await;
-    let is_mode = |message: &MavMessage| matches!(message, MavMessage::COMMAND_LONG(data) if data.command == MavCmd::MAV_CMD_DO_SET_MODE);
+    let is_mode =
+        |message: &MavMessage| matches!(message, MavMessage::COMMAND_LONG(data) if data.command == MavCmd::MAV_CMD_DO_SET_MODE);
     assert!(rig.peer.sent(is_mode) >= 2);
     rig.stop().await;
 }

@@ -101,10 +101,17 @@ struct Transaction {
 #[derive(Debug, Clone, Copy)]
 enum Phase {
     Waiting,
-    Sent { until: Stamp },
-    InProgress { until: Stamp },
+    Sent {
+        until: Stamp,
+    },
+    InProgress {
+        until: Stamp,
+    },
     /// Refused; waits for the words.
-    Refused { until: Stamp, result: &'static str },
+    Refused {
+        until: Stamp,
+        result: &'static str,
+    },
     Accepted,
 }
 

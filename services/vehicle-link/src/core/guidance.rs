@@ -47,11 +47,7 @@ pub fn slot_motion(leader: &Motion, slot: &Slot) -> Motion {
 #[must_use]
 pub fn approach_speed_mps(distance_m: f64, gain_hz: f64, deceleration_mps2: f64) -> f64 {
     let linear_m = deceleration_mps2 / (gain_hz * gain_hz);
-    if distance_m <= linear_m {
-        gain_hz * distance_m
-    } else {
-        (2.0 * deceleration_mps2 * (distance_m - 0.5 * linear_m)).sqrt()
-    }
+    if distance_m <= linear_m { gain_hz * distance_m } else { (2.0 * deceleration_mps2 * (distance_m - 0.5 * linear_m)).sqrt() }
 }
 
 /// A goal of one guidance step.
@@ -154,7 +150,11 @@ mod tests {
             assert_relative_eq!(delta.z, 0.0);
             assert_relative_eq!(delta.x * heading_rad.cos() + delta.y * heading_rad.sin(), 0.0, epsilon = 1e-12);
             // To the right: the heading turned clockwise by a right angle.
-            assert_relative_eq!(delta.y.atan2(delta.x).rem_euclid(2.0 * PI), (heading_rad + PI / 2.0).rem_euclid(2.0 * PI), epsilon = 1e-9);
+            assert_relative_eq!(
+                delta.y.atan2(delta.x).rem_euclid(2.0 * PI),
+                (heading_rad + PI / 2.0).rem_euclid(2.0 * PI),
+                epsilon = 1e-9
+            );
         }
     }
 

@@ -99,7 +99,12 @@ impl Limits {
         check_each(&not_negative, "limits", |value| value >= 0.0, "0 or more")?;
         check_each(&[("separation_m_min", self.separation_m_min)], "limits", |value| value >= 5.0, "at least 5")?;
         check_each(&[("descent_mps", self.descent_mps)], "limits", |value| value <= 0.5, "at most 0.5")?;
-        check_each(&[("speed_mps_max", self.speed_mps_max)], "limits", |value| value >= self.cruise_mps, "at least cruise_mps")?;
+        check_each(
+            &[("speed_mps_max", self.speed_mps_max)],
+            "limits",
+            |value| value >= self.cruise_mps,
+            "at least cruise_mps",
+        )?;
         check_each(
             &[("land_mode_height_m", self.land_mode_height_m)],
             "limits",

@@ -3,10 +3,14 @@
 //! For each vehicle heard, the speed of closing in is limited to what can still be braked before the kept distance, with a
 //! reaction time; inside the kept distance the vehicle opens. Where an obstacle stands between the vehicle and its goal it goes
 //! round, by the shorter side, on the right when both are equal.
+//!
+//! Who follows gives way: a vehicle that isn't following is not pushed along by one that is, or the two would drive each other
+//! faster and faster (the follower after its slot, the leader away from the follower). Inside the least separation nobody waits
+//! for the other.
 
 use nalgebra::Vector3;
 
-use halcyon_model::Stamp;
+use halcyon_model::{Activity, Stamp};
 
 use super::limits::Limits;
 use super::track::Track;
@@ -36,26 +40,31 @@ pub struct Obstacle {
     pub velocity_ned_mps: Vector3<f64>,
     /// Distance to keep, metres, margin included.
     pub keep_m: f64,
+    /// It gives way to us: only its moving off counts, not its coming on, unless it is nearer than this, metres.
+    pub yields_beyond_m: Option<f64>,
 }
 
-/// The obstacle that a track is at `now`; `None` once it is forgotten.
+/// The obstacle that a track is at `now`; `None` once it is forgotten. `own_follows`: whether this vehicle keeps a slot itself.
 #[must_use]
-pub fn obstacle(track: &Track, limits: &Limits, now: Stamp) -> Option<Obstacle> {
+pub fn obstacle(track: &Track, own_follows: bool, limits: &Limits, now: Stamp) -> Option<Obstacle> {
     let silent_s = track.silent_s(now);
     if track.parked() {
         let position_ned_m = track.state.position_ned_m;
-        return Some(Obstacle { position_ned_m, velocity_ned_mps: Vector3::zeros(), keep_m: limits.separation_parked_m });
+        let keep_m = limits.separation_parked_m;
+        return Some(Obstacle { position_ned_m, velocity_ned_mps: Vector3::zeros(), keep_m, yields_beyond_m: None });
     }
     if silent_s > FORGET_S {
         return None;
     }
     let motion = track.predict(now, 0.0);
+    let it_follows = matches!(track.state.activity, Activity::Following { .. });
     let growth_m = (GROWTH_MPS * (silent_s - 1.0)).clamp(0.0, GROWTH_M_MAX);
     Some(Obstacle {
         position_ned_m: motion.position_ned_m,
         // Beyond the prediction nobody knows how it moves.
         velocity_ned_mps: if silent_s > 1.5 { Vector3::zeros() } else { motion.velocity_ned_mps },
         keep_m: limits.separation_m_min + limits.separation_margin_m + growth_m,
+        yields_beyond_m: (it_follows && !own_follows).then_some(limits.separation_m_min),
     })
 }
 
@@ -80,7 +89,11 @@ fn constraint(point_ned_m: Vector3<f64>, obstacle: &Obstacle) -> Constraint {
     let away_m = point_ned_m - obstacle.position_ned_m;
     let distance_m = away_m.norm();
     let normal = if distance_m > 1e-6 { away_m / distance_m } else { Vector3::new(0.0, 0.0, -1.0) };
-    let bound_mps = normal.dot(&obstacle.velocity_ned_mps) + opening_mps_min(distance_m - obstacle.keep_m);
+    let mut coming_mps = normal.dot(&obstacle.velocity_ned_mps);
+    if obstacle.yields_beyond_m.is_some_and(|beyond_m| distance_m > beyond_m) {
+        coming_mps = coming_mps.min(0.0);
+    }
+    let bound_mps = coming_mps + opening_mps_min(distance_m - obstacle.keep_m);
     // Up is always free; down is not, so a vehicle below gives way sideways.
     let across = Vector3::new(normal.x, normal.y, 0.0);
     let push = if normal.z <= 0.0 {
@@ -169,7 +182,12 @@ mod tests {
     use super::*;
 
     fn still(x: f64, y: f64, z: f64) -> Obstacle {
-        Obstacle { position_ned_m: Vector3::new(x, y, z), velocity_ned_mps: Vector3::zeros(), keep_m: 5.0 }
+        Obstacle {
+            position_ned_m: Vector3::new(x, y, z),
+            velocity_ned_mps: Vector3::zeros(),
+            keep_m: 5.0,
+            yields_beyond_m: None,
+        }
     }
 
     /// Braking from the allowed closing speed after the reaction time stops exactly at the kept distance: v τ + v²/2a = gap.

@@ -166,7 +166,8 @@ impl Telemetry {
             && data.onboard_control_sensors_health.contains(prearm);
         self.prearm_ok = Some(Aged(ok, now));
         let fraction = (0..=100).contains(&data.battery_remaining).then(|| f64::from(data.battery_remaining) * 0.01);
-        let volts = (data.voltage_battery != u16::MAX && data.voltage_battery != 0).then(|| f64::from(data.voltage_battery) * 1e-3);
+        let volts =
+            (data.voltage_battery != u16::MAX && data.voltage_battery != 0).then(|| f64::from(data.voltage_battery) * 1e-3);
         self.merge_battery(fraction, volts, now);
     }
 
@@ -262,8 +263,7 @@ fn position(data: &ardu::GLOBAL_POSITION_INT_DATA, stamp: Stamp) -> Option<Posit
 
 /// From MAVLink's 1e-7 degrees and millimetres; (0, 0) is how autopilots say that they don't know.
 fn geodetic(latitude: i32, longitude: i32, altitude_mm: i32) -> Option<Geodetic> {
-    let place =
-        Geodetic::from_deg(f64::from(latitude) * 1e-7, f64::from(longitude) * 1e-7, f64::from(altitude_mm) * 1e-3);
+    let place = Geodetic::from_deg(f64::from(latitude) * 1e-7, f64::from(longitude) * 1e-7, f64::from(altitude_mm) * 1e-3);
     (place.is_valid() && (latitude != 0 || longitude != 0)).then_some(place)
 }
 
@@ -296,8 +296,11 @@ impl BootClock {
         let (since, current, previous) = self.window.unwrap_or((now, i64::MAX, i64::MAX));
         let current = current.min(offset_ns);
         let best = current.min(previous);
-        self.window =
-            Some(if now.seconds_since(since) > OFFSET_WINDOW_S { (now, i64::MAX, current) } else { (since, current, previous) });
+        self.window = Some(if now.seconds_since(since) > OFFSET_WINDOW_S {
+            (now, i64::MAX, current)
+        } else {
+            (since, current, previous)
+        });
         let stamp = Stamp::from_nanos(i64::from(boot_ms) * 1_000_000 + best);
         // However wrong that clock is: never ahead of now, never more than a second behind it.
         stamp.clamp(now.plus_secs_f64(-1.0), now)
@@ -319,7 +322,8 @@ mod tests {
     }
 
     fn basics(telemetry: &mut Telemetry, now: Stamp) {
-        let heartbeat = ardu::HEARTBEAT_DATA { custom_mode: 4, base_mode: MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED, ..Default::default() };
+        let heartbeat =
+            ardu::HEARTBEAT_DATA { custom_mode: 4, base_mode: MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED, ..Default::default() };
         telemetry.observe(&MavMessage::HEARTBEAT(heartbeat), now);
         let position = ardu::GLOBAL_POSITION_INT_DATA {
             time_boot_ms: 50_000,
@@ -369,7 +373,8 @@ mod tests {
         let ekf = |flags| MavMessage::EKF_STATUS_REPORT(ardu::EKF_STATUS_REPORT_DATA { flags, ..Default::default() });
         telemetry.observe(&ekf(good), t(0.0));
         assert!(!telemetry.state(t(0.0)).unwrap().estimator_ok, "no fix yet");
-        let gps = ardu::GPS_RAW_INT_DATA { fix_type: GpsFixType::GPS_FIX_TYPE_3D_FIX, satellites_visible: 9, ..Default::default() };
+        let gps =
+            ardu::GPS_RAW_INT_DATA { fix_type: GpsFixType::GPS_FIX_TYPE_3D_FIX, satellites_visible: 9, ..Default::default() };
         telemetry.observe(&MavMessage::GPS_RAW_INT(gps), t(0.0));
         assert!(telemetry.state(t(0.0)).unwrap().estimator_ok);
         assert!(!telemetry.state(t(6.0)).unwrap().estimator_ok, "stale");

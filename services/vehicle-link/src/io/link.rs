@@ -132,7 +132,8 @@ impl Keeper {
             return Ok(self.endpoint.clone());
         };
         let lookup = self.clock.timeout(CONNECT, tokio::net::lookup_host(host)).await;
-        let mut addresses = lookup.map_err(|_| format!("{host}: no answer to its name"))?.map_err(|error| format!("{host}: {error}"))?;
+        let mut addresses =
+            lookup.map_err(|_| format!("{host}: no answer to its name"))?.map_err(|error| format!("{host}: {error}"))?;
         let address = addresses.next().ok_or_else(|| format!("{host} has no address"))?;
         Ok(format!("{scheme}:{address}"))
     }

@@ -95,7 +95,8 @@ impl Executor {
         let goes_down = off_m <= 2.0 * limits.landing_radius_m;
         let bottom_m = ground_m + (limits.land_mode_height_m - BELOW_M).max(0.1);
         let height_m = if goes_down { bottom_m } else { step.height_m().max(bottom_m) };
-        let floor_m = (step.height_m() - LEAD_DOWN_M).clamp(bottom_m.min(limits.safe_height_m), limits.safe_height_m.max(bottom_m));
+        let floor_m =
+            (step.height_m() - LEAD_DOWN_M).clamp(bottom_m.min(limits.safe_height_m), limits.safe_height_m.max(bottom_m));
         self.drive(at(point, height_m), Vector3::zeros(), None, floor_m, step);
         self.set(activity, format!("{above_ground_m:.1} m up, {off_m:.1} m off"));
     }

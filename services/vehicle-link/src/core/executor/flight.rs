@@ -211,15 +211,15 @@ impl Executor {
         let limits = &self.config.limits;
         let start = Reference { position_ned_m: step.here_ned_m, velocity_ned_mps: step.own.velocity_ned_mps };
         let mut reference = self.reference.unwrap_or(start);
-        let mut target =
-            Target { position_ned_m: place_ned_m, velocity_ned_mps, descent_mps: limits.descent_mps };
+        let mut target = Target { position_ned_m: place_ned_m, velocity_ned_mps, descent_mps: limits.descent_mps };
         if step.height_m() < floor_m - LOW_M {
             target.position_ned_m = Vector3::new(reference.position_ned_m.x, reference.position_ned_m.y, place_ned_m.z);
             target.velocity_ned_mps = Vector3::zeros();
         }
         let wanted = reference.wanted_mps(&target, limits, step.dt_s);
-        let obstacles: Vec<_> =
-            self.neighbours.values().filter_map(|track| separation::obstacle(track, limits, step.now)).collect();
+        let follows = matches!(self.flying, Some(Goal::Follow { .. }));
+        let obstacle = |track| separation::obstacle(track, follows, limits, step.now);
+        let obstacles: Vec<_> = self.neighbours.values().filter_map(obstacle).collect();
         let points = [step.here_ned_m, reference.position_ned_m];
         let mut velocity = separation::filter(wanted, points, target.position_ned_m, &obstacles, limits);
         limit_velocity(&mut velocity, limits, limits.descent_mps);

@@ -29,9 +29,7 @@ mod settle;
 
 use std::collections::BTreeMap;
 
-use halcyon_model::{
-    Activity, FlightMode, LandedState, LocalFrame, LocalPoint, Severity, Stamp, VehicleId, VehicleState,
-};
+use halcyon_model::{Activity, FlightMode, LandedState, LocalFrame, LocalPoint, Severity, Stamp, VehicleId, VehicleState};
 use nalgebra::Vector3;
 
 pub use command::Decision;

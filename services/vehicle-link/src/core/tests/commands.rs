@@ -109,7 +109,10 @@ fn set_mode_guided_gives_the_vehicle_back_to_the_plan_and_another_mode_is_hands_
     world.run(1.0, plan);
     world.command(0, VehicleAction::Hold);
     world.run(2.0, plan);
-    assert_eq!(world.command(0, VehicleAction::SetMode(FlightMode::Guided)), Decision::Ask(Command::SetMode(FlightMode::Guided)));
+    assert_eq!(
+        world.command(0, VehicleAction::SetMode(FlightMode::Guided)),
+        Decision::Ask(Command::SetMode(FlightMode::Guided))
+    );
     world.until(30.0, plan, |world| (world.copters[0].position.x - 40.0).abs() < 0.5);
     world.command(0, VehicleAction::SetMode(FlightMode::Loiter));
     world.run(3.0, plan);

@@ -75,7 +75,8 @@ impl Copter {
         let wanted = match (self.armed, self.mode) {
             (false, _) => {
                 // Without motors it falls, or stands.
-                self.velocity = if self.on_ground() { Vector3::zeros() } else { self.velocity + Vector3::new(0.0, 0.0, 9.8 * dt) };
+                self.velocity =
+                    if self.on_ground() { Vector3::zeros() } else { self.velocity + Vector3::new(0.0, 0.0, 9.8 * dt) };
                 self.velocity
             }
             (true, FlightMode::Guided) => match (self.climb_to, self.setpoint) {
@@ -92,7 +93,11 @@ impl Copter {
             (true, FlightMode::Land) => Vector3::new(0.0, 0.0, 0.5),
             (true, FlightMode::Rtl) => {
                 let back = self.home - self.position;
-                if back.xy().norm() > 0.5 { Vector3::new(back.x, back.y, 0.0).cap_magnitude(3.0) } else { Vector3::new(0.0, 0.0, 0.5) }
+                if back.xy().norm() > 0.5 {
+                    Vector3::new(back.x, back.y, 0.0).cap_magnitude(3.0)
+                } else {
+                    Vector3::new(0.0, 0.0, 0.5)
+                }
             }
             (true, _) => Vector3::zeros(),
         };
@@ -187,16 +192,7 @@ impl World {
         let copters: Vec<_> = homes.iter().enumerate().map(copter).collect();
         let executors = (0..homes.len()).map(|index| Executor::new(config(&format!("v{index}")))).collect();
         let outputs = vec![Vec::new(); homes.len()];
-        Self {
-            now: t0(),
-            copters,
-            executors,
-            outputs,
-            notes: Vec::new(),
-            least_m: f64::INFINITY,
-            mesh: true,
-            generation: 0,
-        }
+        Self { now: t0(), copters, executors, outputs, notes: Vec::new(), least_m: f64::INFINITY, mesh: true, generation: 0 }
     }
 
     /// One that flies already, in GUIDED, at a place and height.
@@ -210,7 +206,8 @@ impl World {
     /// Publishes a plan, valid for `valid_s`.
     pub(super) fn plan(&mut self, tasks: &[(usize, Task)], valid_s: f64) -> Vec<PlanAnswer> {
         self.generation += 1;
-        let assign = |(index, task): &(usize, Task)| Assignment { vehicle: self.copters[*index].id.clone(), task: task.clone() };
+        let assign =
+            |(index, task): &(usize, Task)| Assignment { vehicle: self.copters[*index].id.clone(), task: task.clone() };
         let plan = DispatchPlan {
             stamp: self.now,
             generation: self.generation,
@@ -261,7 +258,10 @@ impl World {
                 copter.frozen = Some(copter.state(self.now));
             }
         }
-        let states: Vec<VehicleState> = self.copters.iter().map(|copter| copter.frozen.clone().unwrap()).collect();
+        let mut states: Vec<VehicleState> = self.copters.iter().map(|copter| copter.frozen.clone().unwrap()).collect();
+        for (state, executor) in states.iter_mut().zip(&self.executors) {
+            executor.complete(state);
+        }
         for (index, executor) in self.executors.iter_mut().enumerate() {
             if !self.copters[index].silent {
                 executor.observe_self(states[index].clone(), self.now, self.now);
@@ -308,7 +308,11 @@ impl World {
         let start = self.now;
         while !done(self) {
             let took_s = self.now.seconds_since(start);
-            assert!(took_s < seconds, "not within {seconds} s: {:?}", self.executors.iter().map(Executor::activity).collect::<Vec<_>>());
+            assert!(
+                took_s < seconds,
+                "not within {seconds} s: {:?}",
+                self.executors.iter().map(Executor::activity).collect::<Vec<_>>()
+            );
             each(self);
             self.step();
         }
