@@ -1,0 +1,10 @@
+//! Wire ⇄ model, one file a subject as in `halcyon/v1/`.
+
+mod command;
+mod geo;
+mod mission;
+mod plan;
+mod sea;
+mod service;
+mod stereo;
+mod vehicle;
