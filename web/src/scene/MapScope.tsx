@@ -213,7 +213,8 @@ export function MapScope() {
         data-testid="map"
         tabIndex={0}
         role="application"
-        aria-label={`Map of the fleet, north up. ${summary(scene.value)} Arrow keys move, plus and minus zoom, F shows everything, Enter proposes a mission at the centre.`}
+        // Says nothing that changes: the fleet list holds the same in words, without interrupting.
+        aria-label="Map of the fleet, north up. Arrow keys move, plus and minus zoom, F shows everything, Enter proposes a mission at the centre."
         onKeyDown={onKey}
       />
       <div class="map-north" aria-hidden="true">
@@ -231,9 +232,6 @@ export function MapScope() {
     </section>
   );
 }
-
-const summary = (picture: Composition): string =>
-  picture.vehicles.length === 0 ? 'No vehicles.' : `${picture.vehicles.map((one) => `${one.id}: ${one.caption}`).join('. ')}.`;
 
 function ScaleBar() {
   const length_m = niceLength_m(view.value.px_per_m, SCALE_BAR_PX);
