@@ -1,0 +1,513 @@
+//! What the autopilot says by itself or when asked.
+
+use std::f64::consts::TAU;
+
+use mavlink::MessageData;
+use mavlink::dialects::ardupilotmega as mav;
+use mavlink::dialects::ardupilotmega::MavMessage;
+
+use super::control::heading_rad;
+use super::{Autopilot, Outbound};
+use crate::copter::GRAVITY_MPS2;
+
+/// ArduCopter 4.6.0, an official release, as AUTOPILOT_VERSION writes it.
+const VERSION: u32 = 0x0406_00FF;
+/// Pressure at sea level (ISA), hectopascals.
+const SEA_LEVEL_HPA: f64 = 1013.25;
+
+impl Autopilot {
+    /// Sends what is due on each link.
+    pub(super) fn stream(&mut self) {
+        self.pump_params();
+        let now = self.now;
+        for place in 0..self.links.len() {
+            // Taken out while messages are built, so that building may look at everything.
+            let mut due = [0_u32; 32];
+            let mut count = 0;
+            let link = &mut self.links[place];
+            let id = link.id;
+            link.due(now, |message_id| {
+                if let Some(free) = due.get_mut(count) {
+                    *free = message_id;
+                    count += 1;
+                }
+            });
+            for message_id in &due[..count] {
+                if let Some(message) = self.telemetry(*message_id) {
+                    self.say(Some(id), Outbound::Message(message));
+                }
+            }
+        }
+    }
+
+    /// Sends the next heartbeats at once, so that a change of mode or arming is seen without waiting.
+    pub(super) fn hurry_heartbeat(&mut self) {
+        let now = self.now;
+        for link in &mut self.links {
+            link.hurry(mav::HEARTBEAT_DATA::ID, now);
+        }
+    }
+
+    /// One message by its id; `None` for one that it does not have, or not yet.
+    pub(super) fn telemetry(&self, message_id: u32) -> Option<MavMessage> {
+        Some(match message_id {
+            mav::HEARTBEAT_DATA::ID => self.heartbeat(),
+            mav::SYS_STATUS_DATA::ID => self.sys_status(),
+            mav::SYSTEM_TIME_DATA::ID => MavMessage::SYSTEM_TIME(mav::SYSTEM_TIME_DATA {
+                time_unix_usec: self.unix_us(),
+                time_boot_ms: self.boot_ms(),
+            }),
+            mav::GPS_RAW_INT_DATA::ID => self.gps_raw(),
+            mav::RAW_IMU_DATA::ID => self.raw_imu(),
+            mav::SCALED_PRESSURE_DATA::ID => self.pressure(),
+            mav::ATTITUDE_DATA::ID => self.attitude(),
+            mav::ATTITUDE_QUATERNION_DATA::ID => self.attitude_quaternion(),
+            mav::LOCAL_POSITION_NED_DATA::ID => self.local_position()?,
+            mav::GLOBAL_POSITION_INT_DATA::ID => self.global_position(),
+            mav::RC_CHANNELS_DATA::ID => self.rc_channels(),
+            mav::SERVO_OUTPUT_RAW_DATA::ID => self.servo_outputs(),
+            mav::MISSION_CURRENT_DATA::ID => self.mission_current(),
+            mav::VFR_HUD_DATA::ID => self.hud(),
+            mav::POSITION_TARGET_LOCAL_NED_DATA::ID => self.local_setpoint()?,
+            mav::BATTERY_STATUS_DATA::ID => self.battery(),
+            mav::AUTOPILOT_VERSION_DATA::ID => version(),
+            mav::SIMSTATE_DATA::ID => self.simulator_state(),
+            mav::EKF_STATUS_REPORT_DATA::ID => self.ekf_status(),
+            mav::HOME_POSITION_DATA::ID => self.home_message()?,
+            mav::EXTENDED_SYS_STATE_DATA::ID => self.extended_state(),
+            mav::GPS_GLOBAL_ORIGIN_DATA::ID => self.origin_message()?,
+            _ => return None,
+        })
+    }
+
+    fn unix_us(&self) -> u64 {
+        (self.now.as_nanos() / 1000).max(0) as u64
+    }
+
+    fn heartbeat(&self) -> MavMessage {
+        use mav::MavModeFlag as Flag;
+        let mut base_mode = Flag::MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+            | Flag::MAV_MODE_FLAG_STABILIZE_ENABLED
+            | Flag::MAV_MODE_FLAG_MANUAL_INPUT_ENABLED;
+        if self.mode.is_guided() {
+            base_mode |= Flag::MAV_MODE_FLAG_GUIDED_ENABLED;
+        }
+        if self.armed {
+            base_mode |= Flag::MAV_MODE_FLAG_SAFETY_ARMED;
+        }
+        let system_status = if self.failsafe.any() {
+            mav::MavState::MAV_STATE_CRITICAL
+        } else if self.armed && !self.landed {
+            mav::MavState::MAV_STATE_ACTIVE
+        } else {
+            mav::MavState::MAV_STATE_STANDBY
+        };
+        MavMessage::HEARTBEAT(mav::HEARTBEAT_DATA {
+            custom_mode: self.mode.number(),
+            mavtype: mav::MavType::MAV_TYPE_QUADROTOR,
+            autopilot: mav::MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA,
+            base_mode,
+            system_status,
+            mavlink_version: 3,
+        })
+    }
+
+    fn sys_status(&self) -> MavMessage {
+        use mav::MavSysStatusSensor as Sensor;
+        let present = Sensor::MAV_SYS_STATUS_SENSOR_3D_GYRO
+            | Sensor::MAV_SYS_STATUS_SENSOR_3D_ACCEL
+            | Sensor::MAV_SYS_STATUS_SENSOR_3D_MAG
+            | Sensor::MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE
+            | Sensor::MAV_SYS_STATUS_SENSOR_GPS
+            | Sensor::MAV_SYS_STATUS_SENSOR_ANGULAR_RATE_CONTROL
+            | Sensor::MAV_SYS_STATUS_SENSOR_ATTITUDE_STABILIZATION
+            | Sensor::MAV_SYS_STATUS_SENSOR_YAW_POSITION
+            | Sensor::MAV_SYS_STATUS_SENSOR_Z_ALTITUDE_CONTROL
+            | Sensor::MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
+            | Sensor::MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
+            | Sensor::MAV_SYS_STATUS_AHRS
+            | Sensor::MAV_SYS_STATUS_SENSOR_BATTERY
+            | Sensor::MAV_SYS_STATUS_PREARM_CHECK;
+        let mut enabled = present;
+        if !self.armed {
+            enabled -= Sensor::MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS;
+        }
+        let mut health = present;
+        if self.sensed.gnss.is_none() {
+            health -= Sensor::MAV_SYS_STATUS_SENSOR_GPS;
+        }
+        if !self.sensed.estimate.attitude_ok {
+            health -= Sensor::MAV_SYS_STATUS_AHRS;
+        }
+        if self.failsafe.battery_stage > 0 {
+            health -= Sensor::MAV_SYS_STATUS_SENSOR_BATTERY;
+        }
+        if self.prearm_problem().is_some() {
+            health -= Sensor::MAV_SYS_STATUS_PREARM_CHECK;
+        }
+        MavMessage::SYS_STATUS(mav::SYS_STATUS_DATA {
+            onboard_control_sensors_present: present,
+            onboard_control_sensors_enabled: enabled,
+            onboard_control_sensors_health: health,
+            load: 250,
+            voltage_battery: (self.sensed.battery_v * 1e3) as u16,
+            current_battery: (self.sensed.battery_a * 1e2) as i16,
+            battery_remaining: (self.sensed.battery_fraction * 100.0).round() as i8,
+            ..Default::default()
+        })
+    }
+
+    fn gps_raw(&self) -> MavMessage {
+        let Some(gnss) = self.sensed.gnss else {
+            return MavMessage::GPS_RAW_INT(mav::GPS_RAW_INT_DATA {
+                time_usec: self.unix_us(),
+                fix_type: mav::GpsFixType::GPS_FIX_TYPE_NO_FIX,
+                eph: u16::MAX,
+                epv: u16::MAX,
+                ..Default::default()
+            });
+        };
+        let (lat, lon, altitude_m) = self.global_e7(gnss.position_ned_m);
+        let velocity_mps = gnss.velocity_ned_mps;
+        let course_rad = velocity_mps.y.atan2(velocity_mps.x).rem_euclid(TAU);
+        let (horizontal_m, vertical_m) = self.sensed.gnss_sigma_m;
+        // Dilution of precision of a good sky: it shrinks with the satellites in use.
+        let hdop = 2.0 / f64::from(self.sensed.satellites.max(4)).sqrt();
+        MavMessage::GPS_RAW_INT(mav::GPS_RAW_INT_DATA {
+            time_usec: self.unix_us(),
+            lat,
+            lon,
+            alt: (altitude_m * 1e3) as i32,
+            eph: (hdop * 100.0) as u16,
+            epv: (hdop * 160.0) as u16,
+            vel: (velocity_mps.xy().norm() * 100.0) as u16,
+            cog: (course_rad.to_degrees() * 100.0) as u16,
+            fix_type: mav::GpsFixType::GPS_FIX_TYPE_3D_FIX,
+            satellites_visible: self.sensed.satellites,
+            alt_ellipsoid: (altitude_m * 1e3) as i32,
+            h_acc: (horizontal_m * 1e3) as u32,
+            v_acc: (vertical_m * 1e3) as u32,
+            vel_acc: 100,
+            ..Default::default()
+        })
+    }
+
+    fn raw_imu(&self) -> MavMessage {
+        // Milli-g and milliradians per second.
+        let force = self.sensed.specific_force_body_mps2 * (1e3 / GRAVITY_MPS2);
+        let rate = self.sensed.estimate.rate_body_radps * 1e3;
+        MavMessage::RAW_IMU(mav::RAW_IMU_DATA {
+            time_usec: self.unix_us(),
+            xacc: force.x as i16,
+            yacc: force.y as i16,
+            zacc: force.z as i16,
+            xgyro: rate.x as i16,
+            ygyro: rate.y as i16,
+            zgyro: rate.z as i16,
+            ..Default::default()
+        })
+    }
+
+    fn pressure(&self) -> MavMessage {
+        // The standard atmosphere below 11 km.
+        let altitude_m = self.frame.origin().altitude_m - self.sensed.estimate.position_ned_m.z;
+        let press_abs = SEA_LEVEL_HPA * (1.0 - 2.255_77e-5 * altitude_m).max(0.0).powf(5.255_88);
+        MavMessage::SCALED_PRESSURE(mav::SCALED_PRESSURE_DATA {
+            time_boot_ms: self.boot_ms(),
+            press_abs: press_abs as f32,
+            temperature: 3500,
+            ..Default::default()
+        })
+    }
+
+    fn attitude(&self) -> MavMessage {
+        let (roll, pitch, yaw) = self.sensed.estimate.ned_from_body.euler_angles();
+        let rate = self.sensed.estimate.rate_body_radps;
+        MavMessage::ATTITUDE(mav::ATTITUDE_DATA {
+            time_boot_ms: self.boot_ms(),
+            roll: roll as f32,
+            pitch: pitch as f32,
+            yaw: yaw as f32,
+            rollspeed: rate.x as f32,
+            pitchspeed: rate.y as f32,
+            yawspeed: rate.z as f32,
+        })
+    }
+
+    fn attitude_quaternion(&self) -> MavMessage {
+        let q = self.sensed.estimate.ned_from_body;
+        let rate = self.sensed.estimate.rate_body_radps;
+        MavMessage::ATTITUDE_QUATERNION(mav::ATTITUDE_QUATERNION_DATA {
+            time_boot_ms: self.boot_ms(),
+            q1: q.w as f32,
+            q2: q.i as f32,
+            q3: q.j as f32,
+            q4: q.k as f32,
+            rollspeed: rate.x as f32,
+            pitchspeed: rate.y as f32,
+            yawspeed: rate.z as f32,
+            repr_offset_q: [0.0; 4],
+        })
+    }
+
+    /// Relative to the filter's origin, which is where it first had a position and not the fleet's.
+    fn local_position(&self) -> Option<MavMessage> {
+        let estimate = &self.sensed.estimate;
+        let place_m = estimate.position_ned_m - self.origin_ned_m?;
+        let velocity_mps = estimate.velocity_ned_mps;
+        Some(MavMessage::LOCAL_POSITION_NED(mav::LOCAL_POSITION_NED_DATA {
+            time_boot_ms: self.boot_ms(),
+            x: place_m.x as f32,
+            y: place_m.y as f32,
+            z: place_m.z as f32,
+            vx: velocity_mps.x as f32,
+            vy: velocity_mps.y as f32,
+            vz: velocity_mps.z as f32,
+        }))
+    }
+
+    fn global_position(&self) -> MavMessage {
+        let estimate = &self.sensed.estimate;
+        let known = self.origin_ned_m.is_some();
+        let (lat, lon, altitude_m) = if known { self.global_e7(estimate.position_ned_m) } else { (0, 0, 0.0) };
+        let velocity = estimate.velocity_ned_mps * 100.0;
+        let heading_deg = heading_rad(&estimate.ned_from_body).rem_euclid(TAU).to_degrees();
+        MavMessage::GLOBAL_POSITION_INT(mav::GLOBAL_POSITION_INT_DATA {
+            time_boot_ms: self.boot_ms(),
+            lat,
+            lon,
+            alt: (altitude_m * 1e3).round() as i32,
+            relative_alt: (self.height_m() * 1e3).round() as i32,
+            vx: velocity.x.round() as i16,
+            vy: velocity.y.round() as i16,
+            vz: velocity.z.round() as i16,
+            hdg: (heading_deg * 100.0) as u16,
+        })
+    }
+
+    fn rc_channels(&self) -> MavMessage {
+        let us = self.sticks.map_or([0; 8], |sticks| sticks.channels_us);
+        MavMessage::RC_CHANNELS(mav::RC_CHANNELS_DATA {
+            time_boot_ms: self.boot_ms(),
+            chan1_raw: us[0],
+            chan2_raw: us[1],
+            chan3_raw: us[2],
+            chan4_raw: us[3],
+            chan5_raw: us[4],
+            chan6_raw: us[5],
+            chan7_raw: us[6],
+            chan8_raw: us[7],
+            chancount: if self.sticks.is_some() { 8 } else { 0 },
+            rssi: u8::MAX,
+            ..Default::default()
+        })
+    }
+
+    fn servo_outputs(&self) -> MavMessage {
+        let ratio = if self.armed { self.controller.thrust_ratio() / self.airframe.thrust_to_weight } else { 0.0 };
+        let motor_us = 1000 + (ratio.clamp(0.0, 1.0) * 1000.0) as u16;
+        let us = self.servos_us;
+        MavMessage::SERVO_OUTPUT_RAW(mav::SERVO_OUTPUT_RAW_DATA {
+            time_usec: self.boot_ms().wrapping_mul(1000),
+            servo1_raw: motor_us,
+            servo2_raw: motor_us,
+            servo3_raw: motor_us,
+            servo4_raw: motor_us,
+            servo5_raw: us[4],
+            servo6_raw: us[5],
+            servo7_raw: us[6],
+            servo8_raw: us[7],
+            servo9_raw: us[8],
+            servo10_raw: us[9],
+            servo11_raw: us[10],
+            servo12_raw: us[11],
+            servo13_raw: us[12],
+            servo14_raw: us[13],
+            servo15_raw: us[14],
+            servo16_raw: us[15],
+            ..Default::default()
+        })
+    }
+
+    fn mission_current(&self) -> MavMessage {
+        let mission_state = if self.mission.items.is_empty() {
+            mav::MissionState::MISSION_STATE_NO_MISSION
+        } else if self.mission.complete {
+            mav::MissionState::MISSION_STATE_COMPLETE
+        } else if self.flight.auto_started {
+            mav::MissionState::MISSION_STATE_ACTIVE
+        } else {
+            mav::MissionState::MISSION_STATE_NOT_STARTED
+        };
+        MavMessage::MISSION_CURRENT(mav::MISSION_CURRENT_DATA {
+            seq: self.mission.current,
+            total: self.mission.items.len() as u16,
+            mission_state,
+            ..Default::default()
+        })
+    }
+
+    fn hud(&self) -> MavMessage {
+        let estimate = &self.sensed.estimate;
+        let speed_mps = estimate.velocity_ned_mps.xy().norm() as f32;
+        let heading_deg = heading_rad(&estimate.ned_from_body).rem_euclid(TAU).to_degrees();
+        let ratio = if self.armed { self.controller.thrust_ratio() / self.airframe.thrust_to_weight } else { 0.0 };
+        MavMessage::VFR_HUD(mav::VFR_HUD_DATA {
+            airspeed: speed_mps,
+            groundspeed: speed_mps,
+            alt: (self.frame.origin().altitude_m - estimate.position_ned_m.z) as f32,
+            climb: -estimate.velocity_ned_mps.z as f32,
+            heading: heading_deg as i16,
+            throttle: (ratio * 100.0) as u16,
+        })
+    }
+
+    fn local_setpoint(&self) -> Option<MavMessage> {
+        let place_m = self.controller.desired_position_m() - self.origin_ned_m?;
+        let velocity_mps = self.controller.desired_velocity_mps();
+        Some(MavMessage::POSITION_TARGET_LOCAL_NED(mav::POSITION_TARGET_LOCAL_NED_DATA {
+            time_boot_ms: self.boot_ms(),
+            x: place_m.x as f32,
+            y: place_m.y as f32,
+            z: place_m.z as f32,
+            vx: velocity_mps.x as f32,
+            vy: velocity_mps.y as f32,
+            vz: velocity_mps.z as f32,
+            type_mask: mav::PositionTargetTypemask::from_bits_retain(0o700 | 0o6000),
+            coordinate_frame: mav::MavFrame::MAV_FRAME_LOCAL_NED,
+            ..Default::default()
+        }))
+    }
+
+    fn battery(&self) -> MavMessage {
+        let mut voltages = [u16::MAX; 10];
+        voltages[0] = (self.sensed.battery_v * 1e3) as u16;
+        MavMessage::BATTERY_STATUS(mav::BATTERY_STATUS_DATA {
+            current_consumed: (self.sensed.battery_ah.1 * 1e3) as i32,
+            // Hectojoules.
+            energy_consumed: (self.sensed.battery_wh * 36.0) as i32,
+            temperature: i16::MAX,
+            voltages,
+            current_battery: (self.sensed.battery_a * 1e2) as i16,
+            battery_function: mav::MavBatteryFunction::MAV_BATTERY_FUNCTION_ALL,
+            mavtype: mav::MavBatteryType::MAV_BATTERY_TYPE_LIPO,
+            battery_remaining: (self.sensed.battery_fraction * 100.0).round() as i8,
+            charge_state: match self.failsafe.battery_stage {
+                0 => mav::MavBatteryChargeState::MAV_BATTERY_CHARGE_STATE_OK,
+                1 => mav::MavBatteryChargeState::MAV_BATTERY_CHARGE_STATE_LOW,
+                _ => mav::MavBatteryChargeState::MAV_BATTERY_CHARGE_STATE_CRITICAL,
+            },
+            ..Default::default()
+        })
+    }
+
+    fn simulator_state(&self) -> MavMessage {
+        let truth = &self.sensed.simulator;
+        let (roll, pitch, yaw) = truth.ned_from_body.euler_angles();
+        let (lat, lng, _) = self.global_e7(truth.position_ned_m);
+        let (force, rate) = (truth.specific_force_body_mps2, truth.rate_body_radps);
+        MavMessage::SIMSTATE(mav::SIMSTATE_DATA {
+            roll: roll as f32,
+            pitch: pitch as f32,
+            yaw: yaw as f32,
+            xacc: force.x as f32,
+            yacc: force.y as f32,
+            zacc: force.z as f32,
+            xgyro: rate.x as f32,
+            ygyro: rate.y as f32,
+            zgyro: rate.z as f32,
+            lat,
+            lng,
+        })
+    }
+
+    fn ekf_status(&self) -> MavMessage {
+        use mav::EkfStatusFlags as Flag;
+        let estimate = &self.sensed.estimate;
+        let mut flags = Flag::empty();
+        if estimate.attitude_ok {
+            flags |= Flag::EKF_ATTITUDE | Flag::EKF_VELOCITY_VERT | Flag::EKF_POS_VERT_ABS;
+        } else {
+            flags |= Flag::EKF_UNINITIALIZED;
+        }
+        if estimate.position_ok {
+            flags |= Flag::EKF_VELOCITY_HORIZ
+                | Flag::EKF_POS_HORIZ_REL
+                | Flag::EKF_POS_HORIZ_ABS
+                | Flag::EKF_PRED_POS_HORIZ_REL
+                | Flag::EKF_PRED_POS_HORIZ_ABS;
+        } else {
+            flags |= Flag::EKF_CONST_POS_MODE;
+        }
+        MavMessage::EKF_STATUS_REPORT(mav::EKF_STATUS_REPORT_DATA {
+            velocity_variance: 0.05,
+            pos_horiz_variance: if estimate.position_ok { 0.05 } else { 1.0 },
+            pos_vert_variance: 0.02,
+            compass_variance: 0.03,
+            flags,
+            ..Default::default()
+        })
+    }
+
+    pub(super) fn home_message(&self) -> Option<MavMessage> {
+        let home_m = self.home_ned_m?;
+        let (latitude, longitude, altitude_m) = self.global_e7(home_m);
+        let local_m = home_m - self.origin_ned_m?;
+        Some(MavMessage::HOME_POSITION(mav::HOME_POSITION_DATA {
+            latitude,
+            longitude,
+            altitude: (altitude_m * 1e3).round() as i32,
+            x: local_m.x as f32,
+            y: local_m.y as f32,
+            z: local_m.z as f32,
+            q: [1.0, 0.0, 0.0, 0.0],
+            time_usec: self.unix_us(),
+            ..Default::default()
+        }))
+    }
+
+    pub(super) fn origin_message(&self) -> Option<MavMessage> {
+        let (latitude, longitude, altitude_m) = self.global_e7(self.origin_ned_m?);
+        Some(MavMessage::GPS_GLOBAL_ORIGIN(mav::GPS_GLOBAL_ORIGIN_DATA {
+            latitude,
+            longitude,
+            altitude: (altitude_m * 1e3).round() as i32,
+            time_usec: self.unix_us(),
+        }))
+    }
+
+    fn extended_state(&self) -> MavMessage {
+        let landed_state = if !self.armed && !self.landed {
+            // Motors stopped in the air: it falls.
+            mav::MavLandedState::MAV_LANDED_STATE_IN_AIR
+        } else if self.landed {
+            mav::MavLandedState::MAV_LANDED_STATE_ON_GROUND
+        } else if self.is_landing() {
+            mav::MavLandedState::MAV_LANDED_STATE_LANDING
+        } else if self.is_taking_off() {
+            mav::MavLandedState::MAV_LANDED_STATE_TAKEOFF
+        } else {
+            mav::MavLandedState::MAV_LANDED_STATE_IN_AIR
+        };
+        MavMessage::EXTENDED_SYS_STATE(mav::EXTENDED_SYS_STATE_DATA {
+            vtol_state: mav::MavVtolState::MAV_VTOL_STATE_UNDEFINED,
+            landed_state,
+        })
+    }
+}
+
+fn version() -> MavMessage {
+    use mav::MavProtocolCapability as Can;
+    MavMessage::AUTOPILOT_VERSION(mav::AUTOPILOT_VERSION_DATA {
+        capabilities: Can::MAV_PROTOCOL_CAPABILITY_MISSION_INT
+            | Can::MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+            | Can::MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT
+            | Can::MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST
+            | Can::MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
+            | Can::MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
+            | Can::MAV_PROTOCOL_CAPABILITY_FLIGHT_TERMINATION
+            | Can::MAV_PROTOCOL_CAPABILITY_MAVLINK2,
+        flight_sw_version: VERSION,
+        ..Default::default()
+    })
+}
