@@ -1,1 +1,5 @@
-fn main() {}
+//! The gateway as a program of its own.
+
+fn main() -> std::process::ExitCode {
+    halcyon_chassis::main(halcyon_gateway::run)
+}

@@ -19,6 +19,8 @@ pub struct Hello {
     pub origin: Global,
     /// The present on the fleet's clock.
     pub now: String,
+    /// Fleet time that passes in one second of wall time; 1 outside simulation.
+    pub speed: f64,
 }
 
 /// Sent every second, so that a client can tell a quiet fleet from a dead connection, and knows the fleet's clock.

@@ -1,0 +1,72 @@
+//! What can be done with a mission, and if not, why not: the words behind every disabled button.
+//!
+//! The planner decides; this mirrors its rules so that a person need not try. Only the phase is looked at, since that is all
+//! that the rules rest on.
+
+use halcyon_model::{Mission, MissionPhase as Phase};
+
+/// What refuses any change to a mission that has ended.
+fn still_open(mission: &Mission) -> Result<(), String> {
+    match mission.phase {
+        Phase::Completed => Err("The mission is completed".into()),
+        Phase::Aborted => Err("The mission was aborted".into()),
+        Phase::Failed => Err("The mission has failed".into()),
+        _ => Ok(()),
+    }
+}
+
+/// Whether a person can say that the follower may go.
+///
+/// # Errors
+/// Why not, for people.
+pub fn approve(mission: &Mission) -> Result<(), String> {
+    still_open(mission)?;
+    match mission.phase {
+        Phase::AwaitingApproval => Ok(()),
+        Phase::Waiting | Phase::Transit => Err("The water is not measured yet".into()),
+        Phase::Assessing => Err("There is no safe verdict yet".into()),
+        Phase::Paused => Err("The mission is paused".into()),
+        _ => Err("It is approved already".into()),
+    }
+}
+
+/// Whether the follower can be sent; while approval is awaited that approves, too.
+///
+/// # Errors
+/// Why not, for people.
+pub fn dispatch(mission: &Mission) -> Result<(), String> {
+    still_open(mission)?;
+    match mission.phase {
+        Phase::AwaitingApproval | Phase::Approved => Ok(()),
+        Phase::Waiting | Phase::Transit => Err("The water is not measured yet".into()),
+        Phase::Assessing => Err("There is no safe verdict yet".into()),
+        Phase::Paused => Err("The mission is paused".into()),
+        _ => Err("The follower is on its way already".into()),
+    }
+}
+
+/// Whether everyone can be made to hold.
+///
+/// # Errors
+/// Why not, for people.
+pub fn pause(mission: &Mission) -> Result<(), String> {
+    still_open(mission)?;
+    if mission.phase == Phase::Paused { Err("The mission is paused already".into()) } else { Ok(()) }
+}
+
+/// Whether it can go on.
+///
+/// # Errors
+/// Why not, for people.
+pub fn resume(mission: &Mission) -> Result<(), String> {
+    still_open(mission)?;
+    if mission.phase == Phase::Paused { Ok(()) } else { Err("The mission is not paused".into()) }
+}
+
+/// Whether everyone can be called back: from every phase but the last.
+///
+/// # Errors
+/// Why not, for people.
+pub fn abort(mission: &Mission) -> Result<(), String> {
+    still_open(mission)
+}

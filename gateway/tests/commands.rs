@@ -1,0 +1,236 @@
+//! What POSTs do.
+
+mod support;
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use halcyon_gateway::Config;
+use halcyon_gateway::port::CommandFailure;
+use halcyon_model::{Approval, CommandReply, FlightMode, MissionAction, MissionPhase, VehicleAction};
+use serde_json::json;
+use support::*;
+
+fn created(gateway: &Gateway) -> Vec<(String, halcyon_model::MissionSpec)> {
+    let commands = gateway.played.mission_commands.lock().unwrap();
+    let created = commands.iter().filter_map(|command| match &command.action {
+        MissionAction::Create(id, spec) => Some((id.to_string(), spec.clone())),
+        _ => None,
+    });
+    created.collect()
+}
+
+#[tokio::test]
+async fn a_mission_is_created_with_defaults_and_can_be_watched() {
+    let gateway = gateway().await;
+    let answer = gateway.post("/api/v1/missions", &json!({"point": {"north_m": 30.0, "east_m": -20.0}})).await;
+    assert_eq!(answer.status, 202, "{answer:?}");
+    let (id, spec) = created(&gateway).remove(0);
+    assert_eq!(answer.headers["location"].to_str().unwrap(), format!("/api/v1/missions/{id}"));
+    assert_eq!(answer.json["mission"], id.as_str());
+    assert_eq!((spec.point.north_m, spec.point.east_m, spec.survey_height_m), (30.0, -20.0, 5.0));
+    assert_eq!((spec.approval, spec.dispatch_on_approval, spec.leader), (Approval::Manual, true, None));
+    let command = gateway.played.mission_commands.lock().unwrap()[0].clone();
+    assert_eq!(command.deadline.seconds_since(command.stamp), 5.0);
+    assert_eq!(command.who, "rest");
+}
+
+#[tokio::test]
+async fn a_point_by_latitude_and_longitude_lands_in_the_local_frame() {
+    let gateway = gateway().await;
+    // Metres per degree at 45° (Snyder, Map Projections, USGS PP 1395): 111 131.779 north, 78 846.835 east.
+    let point = json!({"latitude_deg": 45.001, "longitude_deg": 7.001});
+    gateway.post("/api/v1/missions", &json!({"point": point})).await;
+    let (_, spec) = created(&gateway).remove(0);
+    assert!((spec.point.north_m - 111.13).abs() < 0.02, "{}", spec.point.north_m);
+    assert!((spec.point.east_m - 78.85).abs() < 0.02, "{}", spec.point.east_m);
+}
+
+#[tokio::test]
+async fn bad_missions_never_reach_the_planner() {
+    let gateway = gateway().await;
+    let good = || json!({"point": {"north_m": 0, "east_m": 0}});
+    let check = async |key: &str, value: serde_json::Value, status, words: &str| {
+        let mut body = good();
+        body[key] = value;
+        gateway.post("/api/v1/missions", &body).await.is_problem(status, words);
+    };
+    check("point", json!({"north_m": 1}), 422, "latitude_deg and longitude_deg").await;
+    check("point", json!({"north_m": 1, "east_m": 1, "latitude_deg": 1}), 422, "north_m and east_m").await;
+    check("point", json!({"latitude_deg": 91, "longitude_deg": 0}), 422, "globe").await;
+    check("point", json!({"latitude_deg": 0, "longitude_deg": 0}), 422, "origin").await;
+    check("point", json!({"north_m": 1e9, "east_m": 0}), 422, "origin").await;
+    check("survey_height_m", json!(-1), 422, "survey_height_m").await;
+    check("id", json!("a/b"), 422, "identifier").await;
+    check("leader", json!(""), 422, "identifier").await;
+    check("name", json!("x".repeat(201)), 422, "name").await;
+    check("approval", json!("sometimes"), 422, "sometimes").await;
+    check("surprise", json!(1), 422, "surprise").await;
+
+    let url = gateway.url("/api/v1/missions");
+    let raw = |kind: &'static str, body: Vec<u8>| gateway.client.post(&url).header("content-type", kind).body(body);
+    gateway.send(raw("application/json", b"{".to_vec())).await.is_problem(400, "");
+    gateway.send(raw("application/json", Vec::new())).await.is_problem(400, "");
+    gateway.send(raw("application/json", b"{\"point\":{\"north_m\":1e999,\"east_m\":0}}".to_vec())).await.is_problem(400, "");
+    gateway.send(raw("text/plain", b"{}".to_vec())).await.is_problem(415, "");
+    gateway.send(raw("application/json", vec![b' '; 70_000])).await.is_problem(413, "");
+    assert!(created(&gateway).is_empty());
+}
+
+#[tokio::test]
+async fn a_refusal_and_silence_have_their_own_answers() {
+    let gateway = gateway().await;
+    gateway.app.store.write().mission(mission("m-1", MissionPhase::Waiting, 0.0), at(0.0));
+    *gateway.played.answers.lock().unwrap() = vec![
+        Ok(CommandReply::refused(at(0.0), "there is no safe verdict yet")),
+        Err(CommandFailure::Nobody),
+        Err(CommandFailure::Timeout(Duration::from_secs(5))),
+        Err(CommandFailure::Bus("broken".into())),
+    ];
+    let approve = || gateway.client.post(gateway.url("/api/v1/missions/m-1/approve"));
+    gateway.send(approve()).await.is_problem(409, "no safe verdict");
+    let nobody = gateway.send(approve()).await;
+    nobody.is_problem(503, "planner");
+    assert_eq!(nobody.headers["retry-after"], "1");
+    gateway.send(approve()).await.is_problem(504, "not known");
+    gateway.send(approve()).await.is_problem(503, "broken");
+    gateway.send(gateway.client.post(gateway.url("/api/v1/missions/none/abort"))).await.is_problem(404, "none");
+}
+
+#[tokio::test]
+async fn every_action_goes_to_its_mission_under_its_operator() {
+    let gateway = gateway().await;
+    gateway.app.store.write().mission(mission("m-1", MissionPhase::Waiting, 0.0), at(0.0));
+    for action in ["approve", "dispatch", "pause", "resume", "abort"] {
+        let request = gateway.client.post(gateway.url(&format!("/api/v1/missions/m-1/{action}"))).header("halcyon-operator", "Ada");
+        assert_eq!(gateway.send(request).await.status, 202, "{action}");
+    }
+    let commands = gateway.played.mission_commands.lock().unwrap();
+    let names: Vec<_> = commands.iter().map(|command| format!("{:?}", command.action).split('(').next().unwrap().to_owned()).collect();
+    assert_eq!(names, ["Approve", "Dispatch", "Pause", "Resume", "Abort"]);
+    assert!(commands.iter().all(|command| command.who == "Ada"));
+}
+
+#[tokio::test]
+async fn vehicle_commands_arrive_in_radians() {
+    let gateway = gateway().await;
+    gateway.app.store.write().vehicle(vehicle("f-1", 0.1), at(0.0));
+    let path = "/api/v1/vehicles/f-1/commands";
+    for body in [
+        json!({"action": "arm"}),
+        json!({"action": "take_off", "parameters": {"height_m": 5}}),
+        json!({"action": "go_to", "parameters": {"point": {"north_m": 1, "east_m": 2}, "height_m": 3}}),
+        json!({"action": "set_mode", "parameters": {"mode": "loiter"}}),
+        json!({"action": "set_heading", "parameters": {"heading_deg": -90}}),
+        json!({"action": "follow", "parameters": {"leader": "l-1", "slot": {"forward_m": 0, "right_m": 7, "up_m": 0}}}),
+    ] {
+        let answer = gateway.post(path, &body).await;
+        assert_eq!(answer.status, 202, "{body}: {answer:?}");
+        assert_eq!(answer.headers["location"], "/api/v1/vehicles/f-1");
+    }
+    let actions: Vec<_> =
+        gateway.played.vehicle_commands.lock().unwrap().iter().map(|command| command.action.clone()).collect();
+    assert_eq!(actions[0], VehicleAction::Arm);
+    assert_eq!(actions[1], VehicleAction::TakeOff { height_m: 5.0 });
+    assert_eq!(actions[3], VehicleAction::SetMode(FlightMode::Loiter));
+    let VehicleAction::SetHeading { heading_rad } = actions[4] else { panic!("{actions:?}") };
+    assert!((heading_rad - 1.5 * std::f64::consts::PI).abs() < 1e-12);
+
+    gateway.post(path, &json!({"action": "dance"})).await.is_problem(422, "dance");
+    gateway.post(path, &json!({"action": "take_off"})).await.is_problem(422, "parameters");
+    gateway.post(path, &json!({"action": "take_off", "parameters": {"height_m": 0}})).await.is_problem(422, "height_m");
+    gateway.post(path, &json!({"action": "set_mode", "parameters": {"mode": "WARP"}})).await.is_problem(422, "WARP");
+    gateway.post(path, &json!({"action": "set_heading", "parameters": {"heading_deg": 361}})).await.is_problem(422, "heading_deg");
+    gateway.post("/api/v1/vehicles/none/commands", &json!({"action": "arm"})).await.is_problem(404, "none");
+    assert_eq!(gateway.played.vehicle_commands.lock().unwrap().len(), 6, "what is refused here was not sent");
+}
+
+#[tokio::test]
+async fn a_repeat_under_the_same_key_is_answered_but_not_carried_out() {
+    let gateway = gateway().await;
+    let create = |key: &str, north_m: f64| {
+        let body = json!({"point": {"north_m": north_m, "east_m": 0}});
+        gateway.client.post(gateway.url("/api/v1/missions")).header("idempotency-key", key).json(&body)
+    };
+    let first = gateway.send(create("k1", 1.0)).await;
+    let second = gateway.send(create("k1", 1.0)).await;
+    assert_eq!((first.status, &first.json), (second.status, &second.json));
+    assert_eq!(second.headers["idempotent-replayed"], "true");
+    assert_eq!(second.headers["location"], first.headers["location"]);
+    assert_eq!(created(&gateway).len(), 1);
+
+    gateway.send(create("k1", 2.0)).await.is_problem(422, "Idempotency-Key");
+    gateway.send(create("k 2", 2.0)).await.is_problem(400, "Idempotency-Key");
+    let other = gateway.send(create("k2", 1.0)).await;
+    assert_ne!(other.json["mission"], first.json["mission"]);
+
+    // A refusal is an answer, too.
+    *gateway.played.answers.lock().unwrap() = vec![Ok(CommandReply::refused(at(0.0), "not now"))];
+    gateway.send(create("k3", 1.0)).await.is_problem(409, "not now");
+    gateway.send(create("k3", 1.0)).await.is_problem(409, "not now");
+    assert_eq!(created(&gateway).len(), 3);
+}
+
+#[tokio::test]
+async fn a_repeat_after_a_lost_answer_names_the_same_mission() {
+    let gateway = gateway().await;
+    *gateway.played.answers.lock().unwrap() = vec![Err(CommandFailure::Timeout(Duration::from_secs(5)))];
+    let create = || {
+        let body = json!({"point": {"north_m": 1, "east_m": 0}});
+        gateway.client.post(gateway.url("/api/v1/missions")).header("idempotency-key", "k").json(&body)
+    };
+    gateway.send(create()).await.is_problem(504, "planner");
+    assert_eq!(gateway.send(create()).await.status, 202);
+    let created = created(&gateway);
+    assert_eq!(created.len(), 2);
+    assert_eq!(created[0], created[1], "the planner sees the same mission twice, and so makes one");
+}
+
+#[tokio::test]
+async fn a_repeat_while_the_first_still_runs_is_told_so() {
+    let held = Arc::new(tokio::sync::Semaphore::new(0));
+    let gateway = gateway_with(Config::default(), Played { held: Some(Arc::clone(&held)), ..Played::default() }).await;
+    let create = || {
+        let body = json!({"point": {"north_m": 1, "east_m": 0}});
+        gateway.client.post(gateway.url("/api/v1/missions")).header("idempotency-key", "k").json(&body)
+    };
+    // The first client hangs up while the planner thinks.
+    let first = tokio::spawn(create().send());
+    tokio::time::timeout(Duration::from_secs(10), async {
+        while created(&gateway).is_empty() {
+            tokio::task::yield_now().await;
+        }
+    })
+    .await
+    .unwrap();
+    first.abort();
+    gateway.send(create()).await.is_problem(409, "still being carried out");
+    held.add_permits(1);
+    let answer = tokio::time::timeout(Duration::from_secs(10), async {
+        loop {
+            let answer = gateway.send(create()).await;
+            if answer.status != 409 {
+                return answer;
+            }
+        }
+    })
+    .await
+    .unwrap();
+    assert_eq!(answer.status, 202, "the answer that the first client missed");
+    assert_eq!(created(&gateway).len(), 1);
+}
+
+#[tokio::test]
+async fn other_names_and_other_pages_are_turned_away() {
+    let gateway = gateway().await;
+    let get = |host: &str| gateway.client.get(gateway.url("/api/v1/vehicles")).header("host", host);
+    gateway.send(get("evil.example")).await.is_problem(403, "evil.example");
+    assert_eq!(gateway.send(get("localhost:1")).await.status, 200);
+
+    let body = json!({"point": {"north_m": 1, "east_m": 0}});
+    let post = |origin: &str| gateway.client.post(gateway.url("/api/v1/missions")).header("origin", origin).json(&body);
+    gateway.send(post("http://evil.example")).await.is_problem(403, "origin");
+    gateway.send(post("null")).await.is_problem(403, "origin");
+    assert_eq!(gateway.send(post(&format!("http://{}", gateway.address))).await.status, 202);
+    assert_eq!(created(&gateway).len(), 1);
+}
