@@ -52,8 +52,8 @@ fn a_regular_wave_is_what_it_is() {
         let (sin, cos) = towards_deg.to_radians().sin_cos();
         let along = |share: f64| (2.0 * (0.5 * k_radpm * share * 0.5).sin() / 0.5).powi(2);
         close("slope", found.slope_rms_rad, 0.03 * ((along(cos) + along(sin)) / 2.0).sqrt(), 0.05);
-        // The trace is the elevation at the centre.
-        let centre = (40.0 + 6.5 * 0.25, -7.0 + 8.5 * 0.25);
+        // The trace is the elevation at the cell nearest to the centre.
+        let centre = (40.0 + 7.0 * 0.25, -7.0 + 9.0 * 0.25);
         for point in &found.trace {
             let truth = sea.elevation_m(centre.0, centre.1, point.stamp.seconds_since(start()));
             assert!((point.elevation_m - truth).abs() < 0.006, "{} {truth}", point.elevation_m);
@@ -64,9 +64,7 @@ fn a_regular_wave_is_what_it_is() {
 
 #[test]
 fn a_small_sea_is_safe_a_rough_one_is_not_and_the_limit_is_neither() {
-    let state = |h_m0_m: f64| {
-        last(|_| {}, &Camera::default().film(&Sea::jonswap(h_m0_m, 1.3, 5), 320))
-    };
+    let state = |h_m0_m: f64| last(|_| {}, &Camera::default().film(&Sea::jonswap(h_m0_m, 1.3, 5), 320));
     check(&state(0.05), VerdictState::Safe, &[]);
     let rough = state(0.40);
     assert_eq!(rough.verdict.state, VerdictState::Unsafe);
@@ -94,7 +92,12 @@ fn it_takes_its_time() {
     // One a second of patch time, from the first patch on.
     assert_eq!(states.len(), 80);
     for (i, found) in states.iter().enumerate() {
-        let expected = if found.window_s < 25.0 { VerdictState::Inconclusive } else { VerdictState::Safe };
+        // The time is there after 25 s, 22 waves (a tenth more than the 20 that must remain) a little later.
+        let expected = match found.window_s {
+            ..25.0 => VerdictState::Inconclusive,
+            ..30.0 => continue,
+            _ => VerdictState::Safe,
+        };
         assert_eq!(found.verdict.state, expected, "after {i} s: {:#?}", found.verdict.reasons);
         assert!(found.window_s <= 60.0 && found.patches <= 301);
         let newest = start().plus_secs_f64(i as f64);
@@ -119,7 +122,9 @@ fn a_swell_longer_than_the_footprint_is_not_overlooked() {
 
     // Without a height it cannot be seen, whatever the grids say …
     let blind = Camera { level_sigma_m: None, ..Camera::default() }.film(&swell, 320);
-    check(&last(|_| {}, &blind), VerdictState::Inconclusive, &["long_waves"]);
+    let blinded = last(|_| {}, &blind);
+    assert_eq!(blinded.verdict.state, VerdictState::Inconclusive);
+    assert_eq!((blinded.verdict.reasons[0].check.as_str(), blinded.verdict.reasons[0].passed), ("long_waves", false));
     // … unless the rig stands still: then the distance to the water is the level.
     let fixed = last(|c| c.fixed_rig = true, &blind);
     assert_eq!(fixed.verdict.state, VerdictState::Unsafe);
@@ -146,6 +151,7 @@ fn slow_wander_of_the_height_is_no_sea() {
 fn half_seen_water_is_not_safe() {
     let mut patches = Camera::default().film(&Sea::jonswap(0.05, 1.3, 5), 320);
     for patch in &mut patches {
+        patch.coverage = 8.0 / 18.0;
         for (i, z) in patch.grid.elevation_m.iter_mut().enumerate() {
             if i % 18 > 7 {
                 *z = f32::NAN;
@@ -153,8 +159,11 @@ fn half_seen_water_is_not_safe() {
         }
     }
     check(&last(|_| {}, &patches), VerdictState::Inconclusive, &["coverage"]);
-    // Nothing seen at all: no statistics either, and no panic.
-    patches.iter_mut().for_each(|p| p.grid.elevation_m.fill(f32::NAN));
+    // Nothing seen at all, whatever the patch says: no statistics either, and no panic.
+    patches.iter_mut().for_each(|p| {
+        p.coverage = 1.0;
+        p.grid.elevation_m.fill(f32::NAN);
+    });
     let blind = last(|_| {}, &patches);
     assert_eq!(blind.verdict.state, VerdictState::Inconclusive);
     assert_eq!((blind.h_s_m, blind.waves, blind.coverage), (None, 0, 0.0));
@@ -215,12 +224,12 @@ fn silence_is_not_safe() {
 #[test]
 fn a_gap_does_not_join_what_it_parts() {
     let patches = Camera::default().film(&Sea::jonswap(0.05, 1.3, 5), 300);
-    // 24 s, a hole of 8 s, 28 s: every gauge has two stretches.
+    // 23.8 s, a hole of 8 s, and 27 s up to the last sea state: every gauge has two stretches.
     let (before, after) = (&patches[..120], &patches[160..]);
     let found = last(|_| {}, &[before, after].concat());
     check(&found, VerdictState::Safe, &[]);
     let text = &found.verdict.reasons.iter().find(|r| r.check == "window").unwrap().text;
-    assert!(text.contains("51 s"), "{text}");
+    assert!(text.contains("50 s"), "{text}");
     // Every other patch lost: 2.5 a second still make a series, but crests are sampled too thinly for waves of a second.
     let sparse: Vec<SurfacePatch> = patches.iter().step_by(3).cloned().collect();
     assert!(last(|_| {}, &sparse).verdict.reasons.iter().any(|r| r.check == "sampling" && !r.passed));
@@ -286,7 +295,10 @@ fn the_verdict_does_not_flicker() {
     let highs: Vec<f64> = free.iter().skip(60).map(|s| s.h_s_m.unwrap().high.max(s.h_m0_m.unwrap().high)).collect();
     let limit = highs.iter().fold(0.0_f64, |a, b| a.max(*b)) * 1.005;
     let lowest = highs.iter().fold(f64::INFINITY, |a, b| a.min(*b));
-    assert!(lowest > 0.7 * limit, "the bound wanders by less than the hysteresis is wide, or this shows nothing: {lowest} {limit}");
+    assert!(
+        lowest > 0.7 * limit,
+        "the bound wanders by less than the hysteresis is wide, or this shows nothing: {lowest} {limit}"
+    );
     let states = assess(&mut assessor(|c| c.h_s_m_max = limit), &patches);
     let changes = states.windows(2).filter(|w| w[0].verdict.state != w[1].verdict.state).count();
     assert!(changes <= 1, "{changes} changes of verdict");

@@ -18,7 +18,7 @@ use super::window::Window;
 /// Series are drawn this many times as dense as the patches before crests are looked for.
 const DENSER: f64 = 4.0;
 /// Heights of single waves scatter a little more than the variance does: their intervals have this share of its freedom.
-const HEIGHT_FREEDOM: f64 = 0.8;
+const HEIGHT_FREEDOM: f64 = 0.9;
 /// Two-sided 95 % of the normal distribution.
 const NORMAL_95: f64 = 1.96;
 
@@ -53,25 +53,40 @@ impl Statistics {
         let upper_m2 = mean_square(|s| &s.elevation_upper_m).max(variance_m2);
         let noise_m2 = series.noise_m2;
 
+        // Noise about zero makes waves that are none; a dead band against it swallows small waves that are some. Estimates are the
+        // mean of both counts, bounds reach to the further one.
         let (all, at_each) = waves_at_gauges(series, interval_s, noise_m2.sqrt());
-        let found = WaveStatistics::of(&all);
-        let freedom = degrees_of_freedom(series, interval_s, found.map(|f| f.t_z_s));
-        // Without a sign of any variance there is nothing to scale.
-        let freedom = freedom.unwrap_or(f64::from(u32::try_from(GAUGES).unwrap_or(1))).max(1.0);
+        let counts = [WaveStatistics::of(&waves_at_gauges(series, interval_s, 0.0).0), WaveStatistics::of(&all)];
+        let counts: Vec<WaveStatistics> = counts.into_iter().flatten().collect();
+        let period_s = counts.last().map(|c| c.t_z_s);
+        // Where nothing varies there are no degrees of freedom, and nothing that they would scale.
+        let freedom = degrees_of_freedom(series, interval_s, period_s).unwrap_or(1.0).max(1.0);
         let above_noise = variance_m2 * variance_factors_95(freedom).0 > 2.0 * noise_m2;
 
         let scale = Scale { variance_m2, upper_m2, noise_m2 };
-        let from_m0 = |ratio: f64| ratio * variance_m2.sqrt();
-        let (h_mean_m, h_s_m) =
-            found.map_or((from_m0(H_MEAN_OVER_ROOT_M0), from_m0(H_S_OVER_ROOT_M0)), |f| (f.h_mean_m, f.h_s_m));
-        let t_z_s = found.filter(|_| above_noise).map(|f| mean_period(&all, f.t_z_s, freedom));
+        let height = |pick: fn(&WaveStatistics) -> f64, ratio: f64| {
+            let heights_m: Vec<f64> = counts.iter().map(pick).collect();
+            let heights_m = if heights_m.is_empty() { vec![ratio * variance_m2.sqrt()] } else { heights_m };
+            let of = |height_m: f64| scale.height(height_m, freedom * HEIGHT_FREEDOM);
+            Estimate { value: of(mean(&heights_m)).value, low: of(min(&heights_m)).low, high: of(max(&heights_m)).high }
+        };
+        let periods_s: Vec<f64> = counts.iter().map(|c| c.t_z_s).collect();
+        let t_z_s = (above_noise && !all.is_empty()).then(|| {
+            let error_s = period_error_s(&all, mean(&periods_s), freedom);
+            // A single wave tells no period better than by half of it.
+            Estimate {
+                value: mean(&periods_s),
+                low: (min(&periods_s) - error_s).max(0.5 * min(&periods_s)),
+                high: max(&periods_s) + error_s,
+            }
+        });
         Some(Self {
             waves: all.len(),
             waves_at_one: at_each.into_iter().max().unwrap_or(0),
             above_noise,
-            h_mean_m: scale.height(h_mean_m, freedom * HEIGHT_FREEDOM),
-            h_s_m: scale.height(h_s_m, freedom * HEIGHT_FREEDOM),
-            h_max_m: scale.observed(found.map_or(0.0, |f| f.h_max_m)),
+            h_mean_m: height(|f| f.h_mean_m, H_MEAN_OVER_ROOT_M0),
+            h_s_m: height(|f| f.h_s_m, H_S_OVER_ROOT_M0),
+            h_max_m: scale.observed(counts.iter().map(|c| c.h_max_m).fold(0.0, f64::max), all.len()),
             h_m0_m: scale.height(4.0 * variance_m2.sqrt(), freedom),
             t_z_s,
             slope_rms_rad: slope(window, freedom),
@@ -118,13 +133,19 @@ impl Scale {
         }
     }
 
-    /// Interval of one observed height: only its measurement is uncertain, at its crest and at its trough.
-    fn observed(&self, height_m: f64) -> Estimate {
-        let error_m = NORMAL_95 * (2.0 * self.noise_m2).sqrt();
+    /// Interval of the highest of `waves` observed heights: only its measurement is uncertain, at its crest and at its trough. The
+    /// highest is likely the one with the luckiest errors, √(2 ln n) deviations up in n draws, so it may be that much lower.
+    fn observed(&self, height_m: f64, waves: usize) -> Estimate {
+        let sigma_m = (2.0 * self.noise_m2).sqrt();
+        let luck = (2.0 * (waves.max(1) as f64).ln()).sqrt();
         let ratio =
             |variance_m2: f64| if self.variance_m2 > 0.0 { (variance_m2.max(0.0) / self.variance_m2).sqrt() } else { 0.0 };
         let value = height_m * ratio(self.variance_m2 - self.noise_m2);
-        Estimate { value, low: (value - error_m).max(0.0), high: height_m * ratio(self.upper_m2).max(1.0) + error_m }
+        Estimate {
+            value,
+            low: (value - luck.max(NORMAL_95) * sigma_m).max(0.0),
+            high: height_m * ratio(self.upper_m2).max(1.0) + NORMAL_95 * sigma_m,
+        }
     }
 }
 
@@ -146,12 +167,22 @@ fn waves_at_gauges(series: &Series, interval_s: f64, deadband_m: f64) -> (Vec<Wa
     (all, at_each)
 }
 
-/// Interval of the mean period: the scatter of single periods over the root of the number of independent waves.
-fn mean_period(all: &[Wave], t_z_s: f64, freedom: f64) -> Estimate {
+/// 95 % error of the mean period: the scatter of single periods over the root of the number of independent waves.
+fn period_error_s(all: &[Wave], t_z_s: f64, freedom: f64) -> f64 {
     let variance_s2 = all.iter().map(|w| (w.period_s - t_z_s).powi(2)).sum::<f64>() / all.len() as f64;
-    // A period cannot be told better than by half of itself from a single wave.
-    let error_s = (NORMAL_95 * (variance_s2 / (0.5 * freedom)).sqrt()).min(0.5 * t_z_s);
-    Estimate { value: t_z_s, low: t_z_s - error_s, high: t_z_s + error_s }
+    NORMAL_95 * (variance_s2 / (0.5 * freedom)).sqrt()
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+fn min(values: &[f64]) -> f64 {
+    values.iter().copied().fold(f64::INFINITY, f64::min)
+}
+
+fn max(values: &[f64]) -> f64 {
+    values.iter().copied().fold(f64::NEG_INFINITY, f64::max)
 }
 
 /// Root mean square slope over all frames. It has at least the variance's degrees of freedom: a whole patch is seen, and steep

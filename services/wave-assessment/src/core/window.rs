@@ -26,7 +26,7 @@ pub(crate) struct Frame {
     pub stamp: Stamp,
     pub centre: LocalPoint,
     pub coverage: f64,
-    /// The patch's shorter side, metres.
+    /// The patch's shorter side, or that of a square as large as what was seen of it if that is less, metres.
     pub footprint_m: f64,
     pub readings: [Option<Reading>; GAUGES],
     pub slope: Option<Slope>,
@@ -58,9 +58,10 @@ impl Window {
         let frame = Frame {
             stamp: patch.stamp,
             centre,
-            // A patch cannot cover more than its grid shows.
-            coverage: patch.coverage.min(seen),
-            footprint_m: height_m.min(width_m) + grid.cell_m,
+            // Cells of the grid's rectangle outside a turned footprint do not count: reconstruction knows which those are. But a
+            // patch cannot cover anything without a cell that was seen.
+            coverage: if seen > 0.0 { patch.coverage } else { 0.0 },
+            footprint_m: height_m.min(width_m).min((seen * height_m * width_m).sqrt()).max(grid.cell_m),
             readings: self.gauges.read(grid),
             slope: slope(grid, slope_baseline_m),
             level_m: patch.level_m,

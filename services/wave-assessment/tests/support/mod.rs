@@ -75,12 +75,13 @@ impl Sea {
     }
 }
 
-/// (lowest frequency, width, variance) of 120 bands from 0.5 to 3.2 peak frequencies.
+/// (lowest frequency, width, variance) of 240 bands from 0.55 to 2.45 peak frequencies. A sum of n bands repeats itself after n / (1.9
+/// f_p): there must be so many that its variance is free to wander throughout an observation.
 fn bands(h_m0_m: f64, t_p_s: f64) -> impl Iterator<Item = (f64, f64, f64)> {
     let spectrum = Jonswap::new(h_m0_m, t_p_s, 3.3).unwrap();
-    let width_hz = 2.7 / t_p_s / 120.0;
-    (0..120).map(move |i| {
-        let low_hz = 0.5 / t_p_s + f64::from(i) * width_hz;
+    let width_hz = 1.9 / t_p_s / 240.0;
+    (0..240).map(move |i| {
+        let low_hz = 0.55 / t_p_s + f64::from(i) * width_hz;
         (low_hz, width_hz, spectrum.density_m2_per_hz(low_hz + 0.5 * width_hz) * width_hz)
     })
 }
@@ -104,7 +105,17 @@ pub struct Camera {
 impl Default for Camera {
     /// Five metres over the water with the default rig.
     fn default() -> Self {
-        Self { rows: 14, cols: 18, cell_m: 0.25, rate_hz: 5.0, sigma_m: 0.002, level_sigma_m: Some(0.002), north_m: 40.0, east_m: -7.0, seed: 1 }
+        Self {
+            rows: 14,
+            cols: 18,
+            cell_m: 0.25,
+            rate_hz: 5.0,
+            sigma_m: 0.002,
+            level_sigma_m: Some(0.002),
+            north_m: 40.0,
+            east_m: -7.0,
+            seed: 1,
+        }
     }
 }
 
@@ -124,7 +135,8 @@ impl Camera {
             .map(|c| {
                 let phasors = (0..rows * cols)
                     .map(|i| {
-                        let (n, e) = (self.north_m + (i / cols) as f64 * self.cell_m, self.east_m + (i % cols) as f64 * self.cell_m);
+                        let (n, e) =
+                            (self.north_m + (i / cols) as f64 * self.cell_m, self.east_m + (i % cols) as f64 * self.cell_m);
                         let (sin, cos) = (c.north_radpm * n + c.east_radpm * e).sin_cos();
                         (c.re_m * cos - c.im_m * sin, c.re_m * sin + c.im_m * cos)
                     })
