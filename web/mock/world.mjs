@@ -271,7 +271,7 @@ export class World {
       battery_percent: one.battery, battery_v: 14.1 + one.battery * 0.02, fix: { kind: '3d', satellites: 15, horizontal_sigma_m: 0.8 },
       estimator_ok: true, ready_to_arm: true, boot_s: this.t_s() + 40,
       activity: { kind, settled, slot_error_m: kind === 'following' ? one.away_m ?? null : null, reason: null }, plan_generation: this.generation,
-      home: { ...point(one.home), altitude_m: 0 }, touchdown: one.touchdown ? point(one.touchdown) : null,
+      home: { latitude_deg: point(one.home).latitude_deg, longitude_deg: point(one.home).longitude_deg, altitude_m: 0 }, touchdown: one.touchdown ? point(one.touchdown) : null,
     };
   }
 
