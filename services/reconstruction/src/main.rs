@@ -1,1 +1,5 @@
-fn main() {}
+//! Runs reconstruction by itself.
+
+fn main() -> std::process::ExitCode {
+    halcyon_chassis::main(halcyon_reconstruction::run)
+}

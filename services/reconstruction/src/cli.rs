@@ -1,0 +1,7 @@
+//! What `halcyon calibrate` and `halcyon match` do, without the command line: files in, files and a report out.
+
+mod calibrate;
+mod matching;
+
+pub use calibrate::{CalibrateCliError, CalibrateReport, CameraReport, ViewReport, calibrate};
+pub use matching::{MatchCliError, MatchReport, match_pair};

@@ -1,0 +1,269 @@
+//! Rectification (thesis 4.5): both pictures warped as if taken by two equal, parallel cameras side by side, so that a match
+//! lies on the same row. The maps depend on the calibration alone and are computed once for it.
+
+use halcyon_model::{Image, RigCalibration};
+use nalgebra::{Matrix3, Vector3};
+use opencv::calib3d;
+use opencv::core::{CV_32F, CV_32FC1, CV_8U, Mat, MatTraitConst, MatTraitConstManual, MatTraitManual, Rect, Scalar, Size};
+
+use super::camera;
+use super::cv;
+use super::resample::{Margined, Place, Weights};
+
+/// Why a calibration cannot be rectified.
+#[derive(Debug, thiserror::Error)]
+pub enum RectifyError {
+    /// A number that is not one, or a focal length of nothing.
+    #[error("the calibration's {0} is out of range")]
+    Invalid(&'static str),
+    /// The right camera is not beside the left one.
+    #[error(
+        "the right camera must be to the right of the left one: in the left camera's axes the calibration puts it at \
+         x {x_m:.3} m, y {y_m:.3} m, z {z_m:.3} m"
+    )]
+    NotSideBySide {
+        /// To the right of the left camera.
+        x_m: f64,
+        /// Below it.
+        y_m: f64,
+        /// In front of it.
+        z_m: f64,
+    },
+    /// Pictures of another size than the calibration's.
+    #[error("a picture of {width_px}x{height_px} px does not belong to a calibration for {calibrated_width_px}x{calibrated_height_px}")]
+    Size {
+        /// The picture's width.
+        width_px: u32,
+        /// The picture's height.
+        height_px: u32,
+        /// The calibration's.
+        calibrated_width_px: u32,
+        /// The calibration's.
+        calibrated_height_px: u32,
+    },
+    /// OpenCV failed.
+    #[error("OpenCV failed while rectifying")]
+    OpenCv(#[from] opencv::Error),
+}
+
+/// The two equal cameras that rectification pretends. Points in the rectified left camera frame: x right, y down, z forward.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RectifiedRig {
+    /// Width, pixels.
+    pub width_px: u32,
+    /// Height, pixels.
+    pub height_px: u32,
+    /// Focal length, pixels.
+    pub focal_px: f64,
+    /// Principal point x of both, pixels.
+    pub cx_px: f64,
+    /// Principal point y of both, pixels.
+    pub cy_px: f64,
+    /// Distance between the two centres, metres.
+    pub baseline_m: f64,
+    /// Left camera axes as calibrated from rectified ones; both share the left camera's centre.
+    pub camera_from_rectified: Matrix3<f64>,
+}
+
+impl RectifiedRig {
+    /// The ray (x/z, y/z, 1) through a pixel.
+    #[must_use]
+    pub fn ray(&self, x_px: f64, y_px: f64) -> Vector3<f64> {
+        Vector3::new((x_px - self.cx_px) / self.focal_px, (y_px - self.cy_px) / self.focal_px, 1.0)
+    }
+
+    /// Depth z of a match, metres: z = f b / d (thesis 4-22 in closed form).
+    #[must_use]
+    pub fn depth_m(&self, disparity_px: f64) -> f64 {
+        self.focal_px * self.baseline_m / disparity_px
+    }
+
+    /// The point seen at a pixel with a disparity, rectified left camera frame, metres.
+    #[must_use]
+    pub fn triangulate(&self, x_px: f64, y_px: f64, disparity_px: f64) -> Vector3<f64> {
+        self.ray(x_px, y_px) * self.depth_m(disparity_px)
+    }
+}
+
+/// Warps pairs of one rig. Keeps the warped pictures, so that nothing is allocated per pair.
+pub struct Rectifier {
+    calibration: RigCalibration,
+    rig: RectifiedRig,
+    weights: Weights,
+    margined: Margined,
+    left: Side,
+    right: Side,
+}
+
+/// One camera: where each rectified pixel comes from, whether that is within the picture, and the last picture, rectified.
+struct Side {
+    places: Vec<Place>,
+    inside: Vec<bool>,
+    grey: Mat,
+    exact: Mat,
+}
+
+impl Side {
+    fn new(maps: &(Mat, Mat), size: Size) -> opencv::Result<Self> {
+        let (width, height) = (size.width as usize, size.height as usize);
+        let (x, y) = (maps.0.data_typed::<f32>()?, maps.1.data_typed::<f32>()?);
+        let (right, bottom) = (width as f32 - 0.5, height as f32 - 0.5);
+        Ok(Self {
+            places: x.iter().zip(y).map(|(x, y)| Margined::place(*x, *y, width, height)).collect(),
+            inside: x.iter().zip(y).map(|(x, y)| (-0.5..=right).contains(x) && (-0.5..=bottom).contains(y)).collect(),
+            grey: Mat::default(),
+            exact: Mat::new_rows_cols_with_default(size.height, size.width, CV_32FC1, Scalar::default())?,
+        })
+    }
+
+    fn warp(&mut self, image: &Image, margined: &mut Margined, weights: &Weights) -> opencv::Result<()> {
+        margined.fill(image.pixels(), image.width_px() as usize, image.height_px() as usize);
+        for (value, place) in self.exact.data_typed_mut::<f32>()?.iter_mut().zip(&self.places) {
+            *value = margined.sample(*place, weights);
+        }
+        debug_assert_eq!(self.exact.depth(), CV_32F);
+        self.exact.convert_to(&mut self.grey, CV_8U, 1.0, 0.0)
+    }
+}
+
+impl Rectifier {
+    /// Computes the maps.
+    ///
+    /// # Errors
+    /// [`RectifyError`] for numbers out of range, or cameras that are not side by side, left one left.
+    pub fn new(calibration: &RigCalibration) -> Result<Self, RectifyError> {
+        check(calibration)?;
+        let (left_matrix, left_distortion) = (cv::mat_from_matrix3(&calibration.left.matrix())?, cv::mat_from_distortion(&calibration.left)?);
+        let (right_matrix, right_distortion) =
+            (cv::mat_from_matrix3(&calibration.right.matrix())?, cv::mat_from_distortion(&calibration.right)?);
+        let size = Size::new(calibration.width_px as i32, calibration.height_px as i32);
+        let (mut r1, mut r2, mut p1, mut p2, mut q) = (Mat::default(), Mat::default(), Mat::default(), Mat::default(), Mat::default());
+        calib3d::stereo_rectify(
+            &left_matrix,
+            &left_distortion,
+            &right_matrix,
+            &right_distortion,
+            size,
+            &cv::mat_from_matrix3(&calibration.right_from_left)?,
+            &cv::mat_from_vector3(&calibration.right_from_left_m)?,
+            &mut r1,
+            &mut r2,
+            &mut p1,
+            &mut p2,
+            &mut q,
+            calib3d::CALIB_ZERO_DISPARITY,
+            -1.0,
+            size,
+            None::<&mut Rect>,
+            None::<&mut Rect>,
+        )?;
+        let (projection, right_projection) = (p1.data_typed::<f64>()?.to_vec(), p2.data_typed::<f64>()?.to_vec());
+        let rig = RectifiedRig {
+            width_px: calibration.width_px,
+            height_px: calibration.height_px,
+            focal_px: projection[0],
+            cx_px: projection[2],
+            cy_px: projection[6],
+            baseline_m: -right_projection[3] / right_projection[0],
+            camera_from_rectified: cv::matrix3_from_mat(&r1)?.transpose(),
+        };
+        let left = Side::new(&maps(&left_matrix, &left_distortion, &r1, &p1, size)?, size)?;
+        let right = Side::new(&maps(&right_matrix, &right_distortion, &r2, &p2, size)?, size)?;
+        Ok(Self { calibration: *calibration, rig, weights: Weights::new(), margined: Margined::default(), left, right })
+    }
+
+    /// The calibration that the maps belong to.
+    #[must_use]
+    pub fn calibration(&self) -> &RigCalibration {
+        &self.calibration
+    }
+
+    /// The rectified cameras.
+    #[must_use]
+    pub fn rig(&self) -> &RectifiedRig {
+        &self.rig
+    }
+
+    /// Whether both cameras saw what a match claims: pixel (x, y) of the left rectified picture and, `disparity_px` further
+    /// left, of the right one, with `margin_px` around it along the row. Beyond the edges of a picture, warping invents pixels.
+    #[must_use]
+    pub fn is_seen(&self, x_px: u32, y_px: u32, disparity_px: f32, margin_px: u32) -> bool {
+        let row = y_px as usize * self.rig.width_px as usize;
+        let last_px = (self.rig.width_px - 1) as f32;
+        let right_px = x_px as f32 - disparity_px;
+        let margin_px = margin_px as f32;
+        let within = |side: &Side, at_px: f32| {
+            let (from_px, to_px) = (at_px - margin_px, (at_px + margin_px).min(last_px));
+            from_px >= 0.0 && from_px <= last_px && side.inside[row + from_px.round() as usize] && side.inside[row + to_px.round() as usize]
+        };
+        within(&self.right, right_px) && within(&self.left, (x_px as f32).max(margin_px))
+    }
+
+    /// Warps a pair. The results live in the rectifier until the next call.
+    ///
+    /// # Errors
+    /// [`RectifyError::Size`] for pictures of another size than the calibration's.
+    pub fn rectify(&mut self, left: &Image, right: &Image) -> Result<(), RectifyError> {
+        for image in [left, right] {
+            if (image.width_px(), image.height_px()) != (self.rig.width_px, self.rig.height_px) {
+                return Err(RectifyError::Size {
+                    width_px: image.width_px(),
+                    height_px: image.height_px(),
+                    calibrated_width_px: self.rig.width_px,
+                    calibrated_height_px: self.rig.height_px,
+                });
+            }
+        }
+        self.left.warp(left, &mut self.margined, &self.weights)?;
+        self.right.warp(right, &mut self.margined, &self.weights)?;
+        Ok(())
+    }
+
+    /// The last pair, rectified, left then right, 8-bit: for matchers and people.
+    #[must_use]
+    pub fn grey(&self) -> (&Mat, &Mat) {
+        (&self.left.grey, &self.right.grey)
+    }
+
+    /// The last pair, rectified, left then right, `f32` grey levels without rounding: for sub-pixel work.
+    #[must_use]
+    pub fn exact(&self) -> (&Mat, &Mat) {
+        (&self.left.exact, &self.right.exact)
+    }
+}
+
+/// Refuses what OpenCV would turn into NaN maps.
+fn check(calibration: &RigCalibration) -> Result<(), RectifyError> {
+    for (camera, name) in [(&calibration.left, "left camera"), (&calibration.right, "right camera")] {
+        let finite = camera.matrix().iter().chain(&camera.distortion).all(|number| number.is_finite());
+        let sound = finite && camera.fx_px > 0.0 && camera.fy_px > 0.0;
+        if !sound || !camera::distortion_is_monotone(camera, calibration.width_px, calibration.height_px) {
+            return Err(RectifyError::Invalid(name));
+        }
+    }
+    let rotation = &calibration.right_from_left;
+    let off = (rotation * rotation.transpose() - Matrix3::identity()).norm();
+    // Negated so that NaN is refused, too.
+    if !(off < 1e-3) || rotation.determinant() < 0.0 {
+        return Err(RectifyError::Invalid("rotation between the cameras"));
+    }
+    if !(calibration.baseline_m() > 0.0 && calibration.baseline_m().is_finite()) {
+        return Err(RectifyError::Invalid("baseline"));
+    }
+    if calibration.width_px == 0 || calibration.height_px == 0 {
+        return Err(RectifyError::Invalid("picture size"));
+    }
+    // The right camera's centre in left axes.
+    let centre_m = -(rotation.transpose() * calibration.right_from_left_m);
+    if centre_m.x <= centre_m.y.abs().max(centre_m.z.abs()) {
+        return Err(RectifyError::NotSideBySide { x_m: centre_m.x, y_m: centre_m.y, z_m: centre_m.z });
+    }
+    Ok(())
+}
+
+/// Where each rectified pixel comes from: x and y, `f32`.
+fn maps(matrix: &Mat, distortion: &Mat, rotation: &Mat, projection: &Mat, size: Size) -> opencv::Result<(Mat, Mat)> {
+    let (mut x, mut y) = (Mat::default(), Mat::default());
+    calib3d::init_undistort_rectify_map(matrix, distortion, rotation, projection, size, CV_32FC1, &mut x, &mut y)?;
+    Ok((x, y))
+}
