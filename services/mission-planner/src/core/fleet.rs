@@ -1,0 +1,219 @@
+//! What the planner knows of the vehicles, and whom it may send.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use halcyon_model::{Activity, LandedState, LocalFrame, LocalPoint, Role, Stamp, VehicleId, VehicleState};
+
+use crate::config::Config;
+
+/// Vehicles that are kept in mind; more are ignored, so that a flood of names cannot fill the memory.
+const VEHICLES_MAX: usize = 256;
+
+/// Why a message was not taken in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum Ignored {
+    /// An older one than is known; late, not wrong.
+    #[error("it is older than what is known")]
+    Old,
+    /// Its clock runs ahead.
+    #[error("it is stamped in the future")]
+    Future,
+    /// There are too many senders already.
+    #[error("there are too many senders")]
+    TooMany,
+    /// A number in it is not finite.
+    #[error("a number in it is not finite")]
+    NotFinite,
+}
+
+/// The newest state of a vehicle, and for how long it has been in some conditions.
+#[derive(Debug, Clone)]
+struct Known {
+    state: VehicleState,
+    /// Since when a fail-safe or the pilot has had it.
+    trouble_since: Option<Stamp>,
+    /// Since when it has been on the ground or the water.
+    down_since: Option<Stamp>,
+}
+
+/// All vehicles heard of.
+#[derive(Debug)]
+pub(super) struct Fleet {
+    vehicles: BTreeMap<VehicleId, Known>,
+    /// Since when the planner has been listening.
+    listening_since: Stamp,
+}
+
+impl Fleet {
+    /// Nobody heard yet.
+    #[must_use]
+    pub(super) fn new(now: Stamp) -> Self {
+        Self { vehicles: BTreeMap::new(), listening_since: now }
+    }
+
+    /// Takes in a vehicle's state.
+    ///
+    /// # Errors
+    /// [`Ignored`] if it says nothing new or nothing credible.
+    pub(super) fn observe(&mut self, state: VehicleState, now: Stamp, config: &Config) -> Result<(), Ignored> {
+        if state.stamp.seconds_since(now) > config.clock_skew_max_s {
+            return Err(Ignored::Future);
+        }
+        if !state.position_ned_m.iter().all(|x| x.is_finite()) || !state.heading_rad.is_finite() {
+            return Err(Ignored::NotFinite);
+        }
+        let known = self.vehicles.get(&state.vehicle);
+        if known.is_some_and(|known| state.stamp <= known.state.stamp) {
+            return Err(Ignored::Old);
+        }
+        if known.is_none() && self.vehicles.len() >= VEHICLES_MAX {
+            return Err(Ignored::TooMany);
+        }
+        let since = |holds: bool, before: Option<Stamp>| holds.then(|| before.unwrap_or(state.stamp));
+        let trouble = matches!(state.activity, Activity::FailSafe { .. } | Activity::PilotControl);
+        let down = state.landed == LandedState::OnGround;
+        let trouble_since = since(trouble, known.and_then(|known| known.trouble_since));
+        let down_since = since(down, known.and_then(|known| known.down_since));
+        self.vehicles.insert(state.vehicle.clone(), Known { state, trouble_since, down_since });
+        Ok(())
+    }
+
+    /// The newest state of a vehicle, however old.
+    #[must_use]
+    pub(super) fn last(&self, vehicle: &VehicleId) -> Option<&VehicleState> {
+        self.vehicles.get(vehicle).map(|known| &known.state)
+    }
+
+    /// The state of a vehicle, if it is fresh.
+    #[must_use]
+    pub(super) fn fresh(&self, vehicle: &VehicleId, now: Stamp, config: &Config) -> Option<&VehicleState> {
+        self.last(vehicle).filter(|state| now.seconds_since(state.stamp) <= config.vehicle_age_max_s)
+    }
+
+    /// What has been wrong with a vehicle for longer than the mission can bear: silent, a fail-safe, its pilot.
+    #[must_use]
+    pub(super) fn fault(&self, vehicle: &VehicleId, now: Stamp, config: &Config) -> Option<String> {
+        let Some(known) = self.vehicles.get(vehicle) else {
+            let silent_s = now.seconds_since(self.listening_since);
+            return (silent_s > config.vehicle_lost_s).then(|| format!("{vehicle} is lost: not heard for {silent_s:.0} s"));
+        };
+        let silent_s = now.seconds_since(known.state.stamp);
+        if silent_s > config.vehicle_lost_s {
+            return Some(format!("{vehicle} is lost: not heard for {silent_s:.0} s"));
+        }
+        let lasted_s = now.seconds_since(known.trouble_since?);
+        (lasted_s > config.fault_grace_s).then(|| match &known.state.activity {
+            Activity::FailSafe { reason } => format!("{vehicle} flies its fail-safe: {reason}"),
+            _ => format!("{vehicle} is flown by its pilot"),
+        })
+    }
+
+    /// Whether a vehicle has been on the ground or the water for longer than `for_s`.
+    #[must_use]
+    pub(super) fn is_down(&self, vehicle: &VehicleId, for_s: f64, now: Stamp) -> bool {
+        self.vehicles.get(vehicle).and_then(|known| known.down_since).is_some_and(|since| now.seconds_since(since) >= for_s)
+    }
+
+    /// A vehicle, other than `besides`, whose last known place is within `radius_m` of `point`. However old that knowledge is:
+    /// a vehicle that fell silent is still somewhere.
+    #[must_use]
+    pub(super) fn occupant(&self, point: LocalPoint, radius_m: f64, besides: &[Option<&VehicleId>]) -> Option<&VehicleId> {
+        self.vehicles
+            .iter()
+            .filter(|(vehicle, _)| !besides.contains(&Some(vehicle)))
+            .find(|(_, known)| LocalPoint::from(known.state.position_ned_m).distance_m(&point) < radius_m)
+            .map(|(vehicle, _)| vehicle)
+    }
+
+    /// Why `vehicle` cannot be sent now; `None` if it can. `named` says that the mission asks for this very vehicle.
+    #[must_use]
+    pub(super) fn obstacle(&self, vehicle: &VehicleId, role: Role, named: bool, now: Stamp, config: &Config) -> Option<String> {
+        let Some(state) = self.last(vehicle) else { return Some("not heard yet".into()) };
+        if state.role != role {
+            return Some(format!("not a {}", role_name(role)));
+        }
+        if self.fresh(vehicle, now, config).is_none() {
+            return Some("not heard lately".into());
+        }
+        if !state.estimator_ok {
+            return Some("its position is not good enough to fly by".into());
+        }
+        match state.battery_fraction {
+            None => return Some("its battery is not known".into()),
+            // Written so that NaN is refused.
+            Some(battery) if battery >= config.battery_min => {}
+            Some(_) => return Some(format!("its battery is below {:.0} %", config.battery_min * 100.0)),
+        }
+        match (&state.activity, state.landed) {
+            (Activity::FailSafe { reason }, _) => Some(format!("in a fail-safe: {reason}")),
+            (Activity::PilotControl, _) => Some("flown by its pilot".into()),
+            (_, LandedState::OnGround) if !state.ready_to_arm => Some("not ready to arm".into()),
+            (_, LandedState::OnGround) => away_from_home(state, named, config),
+            (Activity::Idle | Activity::Holding { .. }, LandedState::InAir) => None,
+            (_, LandedState::Unknown) => Some("it is not known whether it is on the ground".into()),
+            _ => Some("busy in the air".into()),
+        }
+    }
+
+    /// The nearest vehicle of `role` to `point` that can be sent; or why nobody can. Equal distances go by name, so that the
+    /// choice is always the same.
+    ///
+    /// # Errors
+    /// One line with a reason for every vehicle of that role.
+    pub(super) fn pick(
+        &self,
+        role: Role,
+        named: Option<&VehicleId>,
+        point: LocalPoint,
+        taken: &BTreeSet<VehicleId>,
+        now: Stamp,
+        config: &Config,
+    ) -> Result<(VehicleId, LocalPoint), String> {
+        let mut best: Option<(f64, &VehicleId, LocalPoint)> = None;
+        let mut reasons = Vec::new();
+        let candidates = self.vehicles.iter().filter(|(vehicle, known)| match named {
+            Some(named) => *vehicle == named,
+            None => known.state.role == role,
+        });
+        for (vehicle, known) in candidates {
+            let obstacle = if taken.contains(vehicle) {
+                Some("busy in another mission".into())
+            } else {
+                self.obstacle(vehicle, role, named.is_some(), now, config)
+            };
+            if let Some(obstacle) = obstacle {
+                reasons.push(format!("{vehicle}: {obstacle}"));
+                continue;
+            }
+            let place = LocalPoint::from(known.state.position_ned_m);
+            let distance_m = place.distance_m(&point);
+            if best.is_none_or(|(least_m, ..)| distance_m < least_m) {
+                best = Some((distance_m, vehicle, place));
+            }
+        }
+        match best {
+            Some((_, vehicle, place)) => Ok((vehicle.clone(), place)),
+            None if reasons.is_empty() => Err(match named {
+                Some(named) => format!("{named} has not been heard"),
+                None => format!("no {} has been heard", role_name(role)),
+            }),
+            None => Err(reasons.join("; ")),
+        }
+    }
+}
+
+/// A role in a word.
+#[must_use]
+pub(super) fn role_name(role: Role) -> &'static str {
+    match role {
+        Role::Leader => "leader",
+        Role::Follower => "follower",
+    }
+}
+
+/// A vehicle that sits away from its home is a follower on the water: it stays there unless a person asks for it by name.
+fn away_from_home(state: &VehicleState, named: bool, config: &Config) -> Option<String> {
+    let from_home = LocalFrame::new(state.home?).ned_from_geodetic(state.position);
+    let away_m = from_home.xy().norm();
+    (!named && away_m > config.home_radius_m).then(|| format!("on the ground {:.0} m from its home", away_m))
+}

@@ -1,0 +1,20 @@
+//! The pure core: synchronous, deterministic, takes `now`, does no I/O.
+//!
+//! - [`Planner`] holds the missions; [`Planner::step`] and [`Planner::command`] return [`Effects`].
+//! - [`geometry`] places the vehicles of a mission about its spot.
+//! - [`Record`] is what must be stored before anything is announced; [`Saved`] is what the store gives back.
+
+mod command;
+mod fleet;
+mod flow;
+pub mod geometry;
+mod homing;
+mod live;
+mod planner;
+mod record;
+mod tasks;
+mod waters;
+
+pub use fleet::Ignored;
+pub use planner::{PLANNER, Planner};
+pub use record::{Course, Effects, Notice, Record, Saved, SavedMission};
