@@ -46,6 +46,7 @@ pub struct Datum {
 /// A setpoint as SET_POSITION_TARGET_GLOBAL_INT: position, velocity and yaw; altitude relative to home, so that neither the
 /// geoid nor the estimator's own origin enters. `None` if a number is not finite: such a setpoint is never sent.
 #[must_use]
+#[allow(deprecated, reason = "the message's own definition still names the _INT frames, and PX4 takes no others")]
 pub fn setpoint(setpoint: &Setpoint, datum: &Datum, to: Address, boot_ms: u32) -> Option<MavMessage> {
     let Setpoint { position_ned_m, velocity_ned_mps, heading_rad } = *setpoint;
     let finite = |v: Vector3<f64>| v.iter().all(|x| x.is_finite());

@@ -11,29 +11,29 @@ use mavlink::dialects::ardupilotmega as ardu;
 use mavlink::dialects::ardupilotmega::{MavCmd, MavMessage, MavResult};
 use mavlink::{MavHeader, MavlinkReader};
 
-pub const SYSTEM: u8 = 42;
+pub(crate) const SYSTEM: u8 = 42;
 
 #[derive(Default)]
-pub struct Shared {
+pub(crate) struct Shared {
     /// Every frame that came.
-    pub frames: Mutex<Vec<(MavHeader, MavMessage)>>,
+    pub(crate) frames: Mutex<Vec<(MavHeader, MavMessage)>>,
     /// Connections taken.
-    pub connections: Mutex<u32>,
+    pub(crate) connections: Mutex<u32>,
     /// Close the present connection.
-    pub hang_up: AtomicBool,
+    pub(crate) hang_up: AtomicBool,
     /// Send this once.
-    pub garbage: Mutex<Vec<u8>>,
+    pub(crate) garbage: Mutex<Vec<u8>>,
     /// Answer arming with a refusal.
-    pub refuse_arming: AtomicBool,
+    pub(crate) refuse_arming: AtomicBool,
     /// Don't answer the first try of anything.
-    pub deaf_once: AtomicBool,
+    pub(crate) deaf_once: AtomicBool,
     mode: Mutex<u32>,
     stop: AtomicBool,
 }
 
-pub struct Peer {
-    pub shared: Arc<Shared>,
-    pub address: SocketAddr,
+pub(crate) struct Peer {
+    pub(crate) shared: Arc<Shared>,
+    pub(crate) address: SocketAddr,
 }
 
 impl Drop for Peer {
@@ -80,7 +80,7 @@ impl Wire for Udp {
 }
 
 impl Peer {
-    pub fn tcp() -> Self {
+    pub(crate) fn tcp() -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = listener.local_addr().unwrap();
         let shared = Arc::new(Shared::default());
@@ -99,7 +99,7 @@ impl Peer {
         Self { shared, address }
     }
 
-    pub fn udp() -> Self {
+    pub(crate) fn udp() -> Self {
         let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
         let address = socket.local_addr().unwrap();
         let shared = Arc::new(Shared::default());
@@ -108,11 +108,11 @@ impl Peer {
         Self { shared, address }
     }
 
-    pub fn set_mode(&self, mode: u32) {
+    pub(crate) fn set_mode(&self, mode: u32) {
         *self.shared.mode.lock().unwrap() = mode;
     }
 
-    pub fn sent(&self, wanted: impl Fn(&MavMessage) -> bool) -> usize {
+    pub(crate) fn sent(&self, wanted: impl Fn(&MavMessage) -> bool) -> usize {
         self.shared.frames.lock().unwrap().iter().filter(|(_, message)| wanted(message)).count()
     }
 }
@@ -189,6 +189,7 @@ fn telemetry(boot_ms: u32, mode: u32) -> Vec<MavMessage> {
             custom_mode: mode,
             mavtype: ardu::MavType::MAV_TYPE_QUADROTOR,
             autopilot: ardu::MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA,
+            base_mode: ardu::MavModeFlag::MAV_MODE_FLAG_CUSTOM_MODE_ENABLED,
             ..Default::default()
         }),
         MavMessage::GLOBAL_POSITION_INT(ardu::GLOBAL_POSITION_INT_DATA {

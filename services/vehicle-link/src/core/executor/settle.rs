@@ -4,14 +4,14 @@ use halcyon_model::Stamp;
 
 /// Within tolerance for long enough; once settled, it takes twice the tolerance to come unsettled.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Settle {
+pub(super) struct Settle {
     since: Option<Stamp>,
     settled: bool,
 }
 
 impl Settle {
     /// Takes the present error; returns whether it is settled.
-    pub fn step(&mut self, error_m: f64, radius_m: f64, for_s: f64, now: Stamp) -> bool {
+    pub(super) fn step(&mut self, error_m: f64, radius_m: f64, for_s: f64, now: Stamp) -> bool {
         let radius_m = if self.settled { 2.0 * radius_m } else { radius_m };
         // NaN is never within.
         if error_m <= radius_m {
@@ -24,7 +24,7 @@ impl Settle {
     }
 
     /// Starts afresh.
-    pub fn reset(&mut self) {
+    pub(super) fn reset(&mut self) {
         *self = Self::default();
     }
 }
