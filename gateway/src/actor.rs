@@ -18,7 +18,8 @@ use crate::{api, feed, server};
 /// # Errors
 /// When the address cannot be had; the message names the key to change.
 pub fn bind(config: &Config) -> anyhow::Result<TcpListener> {
-    let listen = || format!("[gateway] listen = \"{}\" cannot be had; is another gateway running? Choose another port", config.listen);
+    let listen =
+        || format!("[gateway] listen = \"{}\" cannot be had; is another gateway running? Choose another port", config.listen);
     let listener = TcpListener::bind(config.listen).with_context(listen)?;
     listener.set_nonblocking(true).with_context(listen)?;
     Ok(listener)

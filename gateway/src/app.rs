@@ -1,7 +1,7 @@
 //! What every request handler shares.
 
-use std::time::Duration;
 use std::sync::{Arc, Mutex, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
+use std::time::Duration;
 
 use halcyon_model::{FleetId, FleetOrigin, Stamp};
 use tokio::sync::{Semaphore, watch};

@@ -73,7 +73,11 @@ async fn what_is_on_the_bus_is_on_the_web() {
 async fn a_command_reaches_the_planner_and_its_answer_comes_back() {
     let running = start().await;
     let client = reqwest::Client::new();
-    let create = || client.post(format!("{}/api/v1/missions", running.base)).json(&json!({"id": "m-1", "point": {"north_m": 1, "east_m": 2}}));
+    let create = || {
+        client
+            .post(format!("{}/api/v1/missions", running.base))
+            .json(&json!({"id": "m-1", "point": {"north_m": 1, "east_m": 2}}))
+    };
     eventually(format!("{}/api/v1/missions", running.base), |status, _| status == 200).await;
 
     let nobody = create().send().await.unwrap();
@@ -91,7 +95,9 @@ async fn a_command_reaches_the_planner_and_its_answer_comes_back() {
     };
     let ask = async { (create().send().await.unwrap(), create().send().await.unwrap()) };
     let (command, (accepted, refused)) = tokio::time::timeout(LONG, async { tokio::join!(play, ask) }).await.unwrap();
-    assert!(matches!(&command.action, MissionAction::Create(id, spec) if id.as_str() == "m-1" && spec.point == LocalPoint::new(1.0, 2.0)));
+    assert!(
+        matches!(&command.action, MissionAction::Create(id, spec) if id.as_str() == "m-1" && spec.point == LocalPoint::new(1.0, 2.0))
+    );
     assert_eq!(accepted.status(), 202);
     assert_eq!(accepted.headers()["location"], "/api/v1/missions/m-1");
     assert_eq!(refused.status(), 409);

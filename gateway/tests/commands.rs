@@ -102,11 +102,13 @@ async fn every_action_goes_to_its_mission_under_its_operator() {
     let gateway = gateway().await;
     gateway.app.store.write().mission(mission("m-1", MissionPhase::Waiting, 0.0), at(0.0));
     for action in ["approve", "dispatch", "pause", "resume", "abort"] {
-        let request = gateway.client.post(gateway.url(&format!("/api/v1/missions/m-1/{action}"))).header("halcyon-operator", "Ada");
+        let request =
+            gateway.client.post(gateway.url(&format!("/api/v1/missions/m-1/{action}"))).header("halcyon-operator", "Ada");
         assert_eq!(gateway.send(request).await.status, 202, "{action}");
     }
     let commands = gateway.played.mission_commands.lock().unwrap();
-    let names: Vec<_> = commands.iter().map(|command| format!("{:?}", command.action).split('(').next().unwrap().to_owned()).collect();
+    let names: Vec<_> =
+        commands.iter().map(|command| format!("{:?}", command.action).split('(').next().unwrap().to_owned()).collect();
     assert_eq!(names, ["Approve", "Dispatch", "Pause", "Resume", "Abort"]);
     assert!(commands.iter().all(|command| command.who == "Ada"));
 }
@@ -140,7 +142,10 @@ async fn vehicle_commands_arrive_in_radians() {
     gateway.post(path, &json!({"action": "take_off"})).await.is_problem(422, "parameters");
     gateway.post(path, &json!({"action": "take_off", "parameters": {"height_m": 0}})).await.is_problem(422, "height_m");
     gateway.post(path, &json!({"action": "set_mode", "parameters": {"mode": "WARP"}})).await.is_problem(422, "WARP");
-    gateway.post(path, &json!({"action": "set_heading", "parameters": {"heading_deg": 361}})).await.is_problem(422, "heading_deg");
+    gateway
+        .post(path, &json!({"action": "set_heading", "parameters": {"heading_deg": 361}}))
+        .await
+        .is_problem(422, "heading_deg");
     gateway.post("/api/v1/vehicles/none/commands", &json!({"action": "arm"})).await.is_problem(404, "none");
     assert_eq!(gateway.played.vehicle_commands.lock().unwrap().len(), 6, "what is refused here was not sent");
 }

@@ -31,8 +31,12 @@ fn every_reference_leads_somewhere_and_every_operation_can_fail_properly() {
             operations += 1;
             let problem = operation.pointer("/responses/default/content/application~1problem+json");
             assert!(problem.is_some(), "{method} {path}");
-            let names: Vec<_> =
-                operation["parameters"].as_array().into_iter().flatten().filter_map(|parameter| parameter["name"].as_str()).collect();
+            let names: Vec<_> = operation["parameters"]
+                .as_array()
+                .into_iter()
+                .flatten()
+                .filter_map(|parameter| parameter["name"].as_str())
+                .collect();
             assert_eq!(method == "post", names.contains(&"Idempotency-Key"), "{method} {path}");
         }
     }

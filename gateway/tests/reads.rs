@@ -67,7 +67,8 @@ async fn a_mission_says_what_can_be_done_and_why_not() {
         assert_eq!(done["can"][action], json!({"allowed": false, "why": "The mission is completed"}), "{action}");
     }
     // The newest first.
-    let ids: Vec<_> = gateway.get("/api/v1/missions").await.json["items"].as_array().unwrap().iter().map(|m| m["id"].clone()).collect();
+    let ids: Vec<_> =
+        gateway.get("/api/v1/missions").await.json["items"].as_array().unwrap().iter().map(|m| m["id"].clone()).collect();
     assert_eq!(ids, ["m-2", "m-1"]);
 }
 
@@ -128,7 +129,14 @@ async fn overlapping_windows_join_into_one_series() {
 #[tokio::test]
 async fn what_is_not_there_is_a_problem() {
     let gateway = gateway().await;
-    for path in ["/api/v1/nonsense", "/api", "/api/v1/vehicles/none", "/api/v1/missions/none", "/api/v1/plan", "/api/v1/rigs/none/preview"] {
+    for path in [
+        "/api/v1/nonsense",
+        "/api",
+        "/api/v1/vehicles/none",
+        "/api/v1/missions/none",
+        "/api/v1/plan",
+        "/api/v1/rigs/none/preview",
+    ] {
         gateway.get(path).await.is_problem(404, "");
     }
     gateway.get("/api/v1/vehicles/a%2Fb").await.is_problem(400, "identifier");

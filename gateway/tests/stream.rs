@@ -73,7 +73,8 @@ async fn a_snapshot_first_then_what_changes() {
     assert_eq!(kinds, ["event", "mission", "sea_state", "vehicle"]);
 
     gateway.app.store.write().mission(mission("m-1", MissionPhase::AwaitingApproval, 1.0), at(1.0));
-    let changed = client.next().await.unwrap();
+    // What the snapshot held may come once more, never an older value.
+    let changed = client.until(|message| message["type"] == "mission").await;
     assert_eq!(changed["data"]["phase"], "awaiting_approval");
 }
 
@@ -137,14 +138,20 @@ async fn a_client_that_falls_behind_starts_anew_and_delays_nobody() {
 }
 
 #[tokio::test]
-async fn staleness_is_told_without_a_message_from_the_vehicle() {
+async fn what_goes_stale_or_lapses_is_told_without_a_message_from_its_source() {
     let gateway = gateway().await;
     gateway.app.store.write().vehicle(vehicle("leader-1", 0.5), at(0.0));
+    gateway.app.store.write().sea_state(sea_state("leader-1", 0.5, 5.0), at(0.0));
     let mut client = Client::connect(&gateway).await;
     assert_eq!(client.until(|message| message["type"] == "vehicle").await["data"]["stale"], false);
-    // The test's clock stands, so the store is told of a later time by hand.
-    gateway.app.store.write().refresh(at(10.0));
-    assert_eq!(client.until(|message| message["type"] == "vehicle").await["data"]["id"], "leader-1");
+    assert_eq!(client.until(|message| message["type"] == "sea_state").await["data"]["verdict"]["expired"], false);
+    gateway.set_clock(1.4);
+    gateway.app.store.write().event(event("mark", Severity::Info, None));
+    let mark = client.until(|message| message["type"] != "sea_state" && message["data"]["stale"] != false).await;
+    assert_eq!(mark["type"], "event", "1.9 s old is not stale yet");
+    gateway.set_clock(10.0);
+    client.until(|message| message["type"] == "vehicle" && message["data"]["stale"] == true).await;
+    client.until(|message| message["type"] == "sea_state" && message["data"]["verdict"]["expired"] == true).await;
 }
 
 #[tokio::test]
@@ -156,7 +163,8 @@ async fn server_sent_events_tell_the_same() {
     let mut text = String::new();
     let mut chunks = response.bytes_stream();
     let read = async {
-        while !(text.contains("\"type\":\"hello\"") && text.contains("\"type\":\"vehicle\"") && text.contains("\"heartbeat\"")) {
+        while !(text.contains("\"type\":\"hello\"") && text.contains("\"type\":\"vehicle\"") && text.contains("\"heartbeat\""))
+        {
             text.push_str(std::str::from_utf8(&chunks.next().await.unwrap().unwrap()).unwrap());
         }
     };

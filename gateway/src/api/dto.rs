@@ -26,9 +26,7 @@ pub use sea::{Estimate, SeaState, TraceSample, Verdict, VerdictCheck, VerdictSta
 pub use service::{Event, HealthState, Readiness, ReadinessCheck, Service, Severity};
 pub use stream::{Heartbeat, Hello, StreamMessage};
 pub use surface::{Preview, Series, SeriesSample, Surface, WaveHeightSample};
-pub use vehicle::{
-    Activity, ActivityKind, Fix, FixKind, LandedState, LocalPosition, Position, Role, Vehicle, VelocityNed,
-};
+pub use vehicle::{Activity, ActivityKind, Fix, FixKind, LandedState, LocalPosition, Position, Role, Vehicle, VelocityNed};
 
 /// What conversion to JSON needs beside the noun itself: the fleet's local frame and the present.
 #[derive(Debug, Clone, Copy)]
@@ -99,11 +97,7 @@ pub struct Global {
 
 impl From<Geodetic> for Global {
     fn from(position: Geodetic) -> Self {
-        Self {
-            latitude_deg: position.latitude_deg(),
-            longitude_deg: position.longitude_deg(),
-            altitude_m: position.altitude_m,
-        }
+        Self { latitude_deg: position.latitude_deg(), longitude_deg: position.longitude_deg(), altitude_m: position.altitude_m }
     }
 }
 

@@ -35,11 +35,8 @@ pub struct EventQuery {
 #[utoipa::path(get, path = "/api/v1/events", tag = "fleet", operation_id = "list_events", params(EventQuery),
     responses((status = 200, body = Page<Event>)))]
 pub async fn list(State(app): State<App>, Asked(query): Asked<EventQuery>) -> Result<Json<Page<Event>>, ApiError> {
-    let vehicle = query
-        .vehicle
-        .map(model::VehicleId::new)
-        .transpose()
-        .map_err(|error| ApiError::BadRequest(error.to_string()))?;
+    let vehicle =
+        query.vehicle.map(model::VehicleId::new).transpose().map_err(|error| ApiError::BadRequest(error.to_string()))?;
     let pages = PageQuery { limit: query.limit, after: query.after };
     event_page(&app.store.read(), &pages, |event| {
         query.severity.is_none_or(|least| Severity::from(event.severity) >= least)
@@ -49,11 +46,7 @@ pub async fn list(State(app): State<App>, Asked(query): Asked<EventQuery>) -> Re
 }
 
 /// A page of the events that `wanted` takes.
-pub fn event_page(
-    fleet: &Fleet,
-    query: &PageQuery,
-    wanted: impl Fn(&model::Event) -> bool,
-) -> Result<Page<Event>, ApiError> {
+pub fn event_page(fleet: &Fleet, query: &PageQuery, wanted: impl Fn(&model::Event) -> bool) -> Result<Page<Event>, ApiError> {
     let events = fleet.events().filter(|event| wanted(&event.event)).map(|event| (EventCursor(event.sequence), event));
     page(events, query, |event| Event::new(event.sequence, &event.event))
 }

@@ -87,7 +87,9 @@ mod tests {
         for host in ["localhost", "localhost:8080", "127.0.0.1:8080", "[::1]:8080", "app.localhost:1", "LOCALHOST."] {
             assert!(host_allowed(host, true, &[]), "{host}");
         }
-        for host in ["evil.example", "127.0.0.1.evil.example:8080", "192.168.1.5", "ground", "", "[::1", "localhost.evil.example"] {
+        for host in
+            ["evil.example", "127.0.0.1.evil.example:8080", "192.168.1.5", "ground", "", "[::1", "localhost.evil.example"]
+        {
             let loopback_v6 = host == "[::1";
             assert_eq!(host_allowed(host, true, &[]), loopback_v6, "{host}");
         }

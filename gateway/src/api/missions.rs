@@ -139,11 +139,8 @@ async fn ask(app: &App, headers: &HeaderMap, id: MissionId, action: MissionActio
     let stamp = app.now();
     let (timeout, deadline) = app.command_limit(stamp);
     let command = MissionCommand { stamp, deadline, who, action };
-    let reply = app
-        .commands
-        .mission(command, timeout)
-        .await
-        .map_err(|failure| ApiError::no_answer("the mission planner", &failure))?;
+    let reply =
+        app.commands.mission(command, timeout).await.map_err(|failure| ApiError::no_answer("the mission planner", &failure))?;
     if !reply.accepted {
         return Err(ApiError::Refused(reply.reason));
     }

@@ -76,9 +76,9 @@ impl ApiError {
     pub fn no_answer(whom: &str, failure: &CommandFailure) -> Self {
         match failure {
             CommandFailure::Nobody => Self::Unavailable(format!("{whom} is not there; nothing was done")),
-            CommandFailure::Timeout(_) => {
-                Self::Timeout(format!("{whom}: {failure}; whether it was carried out is not known, so look before trying again"))
-            }
+            CommandFailure::Timeout(_) => Self::Timeout(format!(
+                "{whom}: {failure}; whether it was carried out is not known, so look before trying again"
+            )),
             CommandFailure::Bus(_) => Self::Unavailable(format!("{whom} could not be asked: {failure}")),
         }
     }

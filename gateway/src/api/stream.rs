@@ -8,9 +8,9 @@ use std::convert::Infallible;
 use std::sync::Arc;
 use std::time::Duration;
 
+use axum::extract::State;
 use axum::extract::ws::rejection::WebSocketUpgradeRejection;
 use axum::extract::ws::{CloseFrame, Message, Utf8Bytes, WebSocket, WebSocketUpgrade, close_code};
-use axum::extract::State;
 use axum::response::sse::{Event, Sse};
 use axum::response::{IntoResponse, Response};
 use futures::Stream;
@@ -46,9 +46,9 @@ impl Subscription {
         if app.stop.is_cancelled() {
             return Err(ApiError::Unavailable("the gateway is stopping".into()));
         }
-        let permit = Arc::clone(&app.streams)
-            .try_acquire_owned()
-            .map_err(|_| ApiError::Unavailable("too many live streams are open; [gateway] streams_max sets the limit".into()))?;
+        let permit = Arc::clone(&app.streams).try_acquire_owned().map_err(|_| {
+            ApiError::Unavailable("too many live streams are open; [gateway] streams_max sets the limit".into())
+        })?;
         let batches = app.feed.subscribe();
         metrics::gauge!("gateway_stream_clients").increment(1.0);
         Ok(Self { app, batches, revision: 0, _permit: permit })
@@ -107,10 +107,7 @@ pub async fn websocket(
 ) -> Result<Response, ApiError> {
     let upgrade = upgrade.map_err(|error| ApiError::UpgradeRequired(error.body_text()))?;
     let subscription = Subscription::open(app)?;
-    Ok(upgrade
-        .max_message_size(CLIENT_MESSAGE_BYTES_MAX)
-        .on_upgrade(|socket| serve(socket, subscription))
-        .into_response())
+    Ok(upgrade.max_message_size(CLIENT_MESSAGE_BYTES_MAX).on_upgrade(|socket| serve(socket, subscription)).into_response())
 }
 
 async fn serve(mut socket: WebSocket, mut subscription: Subscription) {

@@ -85,10 +85,7 @@ fn action(app: &App, request: VehicleCommandRequest) -> Result<VehicleAction, Ap
                 return Err(ApiError::Invalid("a slot lies within 1000 m of its leader".into()));
             }
             let leader = VehicleId::new(leader).map_err(|error| ApiError::Invalid(error.to_string()))?;
-            VehicleAction::Follow {
-                leader,
-                slot: Slot { forward_m: slot.forward_m, right_m: slot.right_m, up_m: slot.up_m },
-            }
+            VehicleAction::Follow { leader, slot: Slot { forward_m: slot.forward_m, right_m: slot.right_m, up_m: slot.up_m } }
         }
         Asked::Hold => VehicleAction::Hold,
         Asked::Land => VehicleAction::Land,

@@ -244,7 +244,9 @@ impl Fleet {
         let edge = self.edge(now);
         let mut messages = Vec::new();
         messages.extend(
-            self.services.since(revision).map(|kept| StreamMessage::Service(dto::Service::new(&kept.value, kept.stale || kept.expired, &edge))),
+            self.services
+                .since(revision)
+                .map(|kept| StreamMessage::Service(dto::Service::new(&kept.value, kept.stale || kept.expired, &edge))),
         );
         messages.extend(
             self.vehicles.since(revision).map(|kept| StreamMessage::Vehicle(dto::Vehicle::new(&kept.value, kept.stale, &edge))),

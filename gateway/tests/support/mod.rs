@@ -14,9 +14,7 @@ use halcyon_gateway::port::{CommandFailure, Commands, Previews};
 use halcyon_gateway::{Config, api, feed, server};
 use halcyon_model::*;
 
-/// The fleet's clock in every test stands at this second.
-pub const NOW_S: f64 = 1_790_000_000.0;
-
+/// A time this many seconds after the one at which the fleet's clock stands, until [`Gateway::set_clock`].
 pub fn at(offset_s: f64) -> Stamp {
     Stamp::from_nanos(1_790_000_000_000_000_000).plus_secs_f64(offset_s)
 }
@@ -39,7 +37,11 @@ impl Played {
                 held.acquire().await.unwrap().forget();
             }
             let mut answers = self.answers.lock().unwrap();
-            if answers.is_empty() { Ok(CommandReply { mission, ..CommandReply::accepted(at(0.0), "done") }) } else { answers.remove(0) }
+            if answers.is_empty() {
+                Ok(CommandReply { mission, ..CommandReply::accepted(at(0.0), "done") })
+            } else {
+                answers.remove(0)
+            }
         }
         .boxed()
     }
@@ -75,6 +77,7 @@ impl Previews for NoPreviews {
 
 pub struct Gateway {
     pub app: App,
+    clock: Arc<Mutex<Stamp>>,
     pub played: Arc<Played>,
     pub address: SocketAddr,
     pub client: reqwest::Client,
@@ -93,6 +96,7 @@ pub async fn gateway() -> Gateway {
 }
 
 pub async fn gateway_with(config: Config, played: Played) -> Gateway {
+    let clock = Arc::new(Mutex::new(at(0.0)));
     let (played, stop) = (Arc::new(played), CancellationToken::new());
     let origin = FleetOrigin(Geodetic::from_deg(45.0, 7.0, 0.0));
     let store = Arc::new(Store::new(Fleet::new(origin, config.limits())));
@@ -100,7 +104,10 @@ pub async fn gateway_with(config: Config, played: Played) -> Gateway {
         config: config.clone(),
         fleet: FleetId::new("test").unwrap(),
         origin,
-        now: Box::new(|| at(0.0)),
+        now: {
+            let clock = Arc::clone(&clock);
+            Box::new(move || *clock.lock().unwrap())
+        },
         speed: 1.0,
         commands: Box::new(Shared(Arc::clone(&played))),
         previews: Box::new(NoPreviews),
@@ -114,7 +121,7 @@ pub async fn gateway_with(config: Config, played: Played) -> Gateway {
     let (router, ends) = (api::router(app.clone()), stop.clone());
     let server = tokio::spawn(async move { server::serve(listener, router, &config, ends).await });
     tokio::spawn(feed::run(app.clone()));
-    Gateway { app, played, address, client: reqwest::Client::new(), stop, server }
+    Gateway { app, clock, played, address, client: reqwest::Client::new(), stop, server }
 }
 
 /// A response, read whole.
@@ -147,6 +154,10 @@ impl Answer {
 }
 
 impl Gateway {
+    pub fn set_clock(&self, offset_s: f64) {
+        *self.clock.lock().unwrap() = at(offset_s);
+    }
+
     pub fn url(&self, path: &str) -> String {
         format!("http://{}{path}", self.address)
     }
@@ -239,7 +250,9 @@ pub fn sea_state(rig: &str, age_s: f64, valid_for_s: f64) -> SeaState {
         h_m0_m: None,
         t_z_s: None,
         slope_rms_rad: None,
-        trace: (0..5).map(|step| TracePoint { stamp: at(-age_s - 4.0 + f64::from(step)), elevation_m: f64::from(step) }).collect(),
+        trace: (0..5)
+            .map(|step| TracePoint { stamp: at(-age_s - 4.0 + f64::from(step)), elevation_m: f64::from(step) })
+            .collect(),
         verdict: Verdict {
             state: VerdictState::Safe,
             reasons: vec![VerdictReason { check: "significant_height".into(), passed: true, text: "low".into() }],

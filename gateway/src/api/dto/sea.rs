@@ -129,10 +129,10 @@ impl SeaState {
     /// From the model; `stale` is the store's judgement.
     #[must_use]
     pub fn new(sea: &model::SeaState, stale: bool, edge: &Edge) -> Self {
-        let trace = sea.trace.iter().map(|point| TraceSample {
-            t_s: point.stamp.seconds_since(sea.stamp),
-            elevation_m: point.elevation_m,
-        });
+        let trace = sea
+            .trace
+            .iter()
+            .map(|point| TraceSample { t_s: point.stamp.seconds_since(sea.stamp), elevation_m: point.elevation_m });
         Self {
             rig: sea.rig.to_string(),
             stamp: rfc3339(sea.stamp),

@@ -280,11 +280,7 @@ impl Vehicle {
             stale,
             position: state.position.into(),
             local: LocalPosition { north_m: position_ned_m.x, east_m: position_ned_m.y, height_m: -position_ned_m.z },
-            velocity: VelocityNed {
-                north_mps: velocity_ned_mps.x,
-                east_mps: velocity_ned_mps.y,
-                down_mps: velocity_ned_mps.z,
-            },
+            velocity: VelocityNed { north_mps: velocity_ned_mps.x, east_mps: velocity_ned_mps.y, down_mps: velocity_ned_mps.z },
             heading_deg: state.heading_rad.to_degrees().rem_euclid(360.0),
             roll_deg: roll_rad.to_degrees(),
             pitch_deg: pitch_rad.to_degrees(),
