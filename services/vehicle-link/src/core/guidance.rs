@@ -59,10 +59,16 @@ pub struct Target {
     pub velocity_ned_mps: Vector3<f64>,
     /// Downward speed limit, metres per second.
     pub descent_mps: f64,
+    /// Change limit of the reference's velocity, metres per second squared.
+    pub acceleration_mps2: f64,
+    /// Gain of the final approach, 1/s.
+    pub gain_hz: f64,
 }
 
-/// Gain of the final approach to a goal, 1/s.
-const GAIN_HZ: f64 = 1.0;
+/// Gain of the final approach to a place, and to a slot, 1/s.
+pub const PLACE_GAIN_HZ: f64 = 1.0;
+/// See [`PLACE_GAIN_HZ`].
+pub const SLOT_GAIN_HZ: f64 = 1.5;
 /// The reference never runs further ahead of the vehicle than this, metres.
 const LEASH_M: f64 = 3.0;
 
@@ -84,17 +90,18 @@ impl Reference {
         let across_m = Vector3::new(error_m.x, error_m.y, 0.0);
         let distance_m = across_m.norm();
         // Braking is planned softer than the limit, so that the change limit below doesn't make it overshoot.
-        let closing_mps = approach_speed_mps(distance_m, GAIN_HZ, 0.7 * limits.acceleration_mps2).min(limits.cruise_mps);
+        let closing_mps = approach_speed_mps(distance_m, target.gain_hz, 0.7 * limits.acceleration_mps2).min(limits.cruise_mps);
         let mut wanted = target.velocity_ned_mps;
         if distance_m > 1e-9 {
             wanted += across_m * (closing_mps / distance_m);
         }
-        let vertical_mps = approach_speed_mps(error_m.z.abs(), GAIN_HZ, 0.5 * limits.acceleration_mps2) * error_m.z.signum();
+        let vertical_mps =
+            approach_speed_mps(error_m.z.abs(), target.gain_hz, 0.5 * limits.acceleration_mps2) * error_m.z.signum();
         wanted.z += vertical_mps;
         limit_velocity(&mut wanted, limits, target.descent_mps);
         // Change limit.
         let change = wanted - self.velocity_ned_mps;
-        let change_max_mps = limits.acceleration_mps2 * dt_s;
+        let change_max_mps = target.acceleration_mps2 * dt_s;
         if change.norm() > change_max_mps { self.velocity_ned_mps + change * (change_max_mps / change.norm()) } else { wanted }
     }
 
@@ -183,7 +190,13 @@ mod tests {
         let limits = Limits::default();
         let mut reference = Reference { position_ned_m: Vector3::new(0.0, 0.0, -5.0), velocity_ned_mps: Vector3::zeros() };
         let goal = Vector3::new(60.0, 0.0, -8.0);
-        let target = Target { position_ned_m: goal, velocity_ned_mps: Vector3::zeros(), descent_mps: 0.5 };
+        let target = Target {
+            position_ned_m: goal,
+            velocity_ned_mps: Vector3::zeros(),
+            descent_mps: 0.5,
+            acceleration_mps2: 1.5,
+            gain_hz: 1.0,
+        };
         for _ in 0..400 {
             let before = reference.velocity_ned_mps;
             let velocity = reference.wanted_mps(&target, &limits, 0.1);

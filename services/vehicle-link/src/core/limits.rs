@@ -25,6 +25,9 @@ pub struct Limits {
     pub descent_mps: f64,
     /// Acceleration of ordinary setpoints, metres per second squared.
     pub acceleration_mps2: f64,
+    /// Acceleration of setpoints that follow a leader, metres per second squared: more than a leader uses, or the follower
+    /// falls behind at each of its turns.
+    pub follow_acceleration_mps2: f64,
     /// Least distance to every flying vehicle, metres; at least 5 (thesis §6.8).
     pub separation_m_min: f64,
     /// Distance kept on top of `separation_m_min` for control lag and position noise, metres.
@@ -59,6 +62,7 @@ impl Default for Limits {
             climb_mps: 1.5,
             descent_mps: 0.5,
             acceleration_mps2: 1.5,
+            follow_acceleration_mps2: 3.0,
             separation_m_min: 5.0,
             separation_margin_m: 0.5,
             separation_parked_m: 3.0,
@@ -87,6 +91,7 @@ impl Limits {
             ("climb_mps", self.climb_mps),
             ("descent_mps", self.descent_mps),
             ("acceleration_mps2", self.acceleration_mps2),
+            ("follow_acceleration_mps2", self.follow_acceleration_mps2),
             ("separation_parked_m", self.separation_parked_m),
             ("settle_radius_m", self.settle_radius_m),
             ("settle_s", self.settle_s),

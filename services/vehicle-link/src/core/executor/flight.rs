@@ -6,12 +6,14 @@ use nalgebra::Vector3;
 use super::{Executor, Goal, Output};
 use crate::core::commands::Command;
 use crate::core::failsafe::{Action, Alarm, Cause, Conditions, PlanHealth};
-use crate::core::guidance::{Reference, Setpoint, Target, limit_velocity, slot_motion};
+use crate::core::guidance::{PLACE_GAIN_HZ, Reference, SLOT_GAIN_HZ, Setpoint, Target, limit_velocity, slot_motion};
 use crate::core::interlock;
 use crate::core::separation;
 
 /// The autopilot's own climb is waited for so long, seconds; then guidance takes over.
 const CLIMB_S_MAX: f64 = 30.0;
+/// And ends when the vehicle is up and climbs no faster than this, metres per second.
+const CLIMBED_MPS: f64 = 0.5;
 /// Nearer than this to its place a vehicle may go to the place's own height, and counts as there, metres.
 const NEAR_M: f64 = 3.0;
 /// Lower than the floor by more than this, a vehicle climbs before it goes anywhere, metres.
@@ -61,7 +63,8 @@ impl Executor {
         let here_ned_m = own.position_ned_m + own.velocity_ned_mps * age_s;
         let land_now = alarm.as_ref().is_some_and(|alarm| alarm.action == Action::Land);
         if let Some(climb) = self.climb.filter(|_| own.mode == FlightMode::Guided && !land_now) {
-            if -here_ned_m.z < climb.height_m - 0.5 && now.seconds_since(climb.since) < CLIMB_S_MAX {
+            let arrived = -here_ned_m.z >= climb.height_m - 0.5 && own.velocity_ned_mps.z.abs() < CLIMBED_MPS;
+            if !arrived && now.seconds_since(climb.since) < CLIMB_S_MAX {
                 // A setpoint now would end the autopilot's own take-off.
                 return self.set(Activity::TakingOff, format!("to {:.1} m", climb.height_m));
             }
@@ -211,13 +214,19 @@ impl Executor {
         let limits = &self.config.limits;
         let start = Reference { position_ned_m: step.here_ned_m, velocity_ned_mps: step.own.velocity_ned_mps };
         let mut reference = self.reference.unwrap_or(start);
-        let mut target = Target { position_ned_m: place_ned_m, velocity_ned_mps, descent_mps: limits.descent_mps };
+        let follows = matches!(self.flying, Some(Goal::Follow { .. }));
+        let mut target = Target {
+            position_ned_m: place_ned_m,
+            velocity_ned_mps,
+            descent_mps: limits.descent_mps,
+            acceleration_mps2: if follows { limits.follow_acceleration_mps2 } else { limits.acceleration_mps2 },
+            gain_hz: if follows { SLOT_GAIN_HZ } else { PLACE_GAIN_HZ },
+        };
         if step.height_m() < floor_m - LOW_M {
             target.position_ned_m = Vector3::new(reference.position_ned_m.x, reference.position_ned_m.y, place_ned_m.z);
             target.velocity_ned_mps = Vector3::zeros();
         }
         let wanted = reference.wanted_mps(&target, limits, step.dt_s);
-        let follows = matches!(self.flying, Some(Goal::Follow { .. }));
         let obstacle = |track| separation::obstacle(track, follows, limits, step.now);
         let obstacles: Vec<_> = self.neighbours.values().filter_map(obstacle).collect();
         let points = [step.here_ned_m, reference.position_ned_m];
