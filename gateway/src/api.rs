@@ -5,6 +5,7 @@ pub mod dto;
 pub mod events;
 pub mod extract;
 pub mod guard;
+pub mod headers;
 pub mod idempotency;
 pub mod missions;
 pub mod openapi;

@@ -166,6 +166,8 @@ async fn a_repeat_under_the_same_key_is_answered_but_not_carried_out() {
 
     gateway.send(create("k1", 2.0)).await.is_problem(422, "Idempotency-Key");
     gateway.send(create("k 2", 2.0)).await.is_problem(400, "Idempotency-Key");
+    gateway.send(create("k1", 1.0).header("halcyon-operator", "Ada")).await.is_problem(422, "Idempotency-Key");
+    gateway.send(create("k9", 1.0).header("halcyon-operator", "A\tda")).await.is_problem(400, "Operator");
     let other = gateway.send(create("k2", 1.0)).await;
     assert_ne!(other.json["mission"], first.json["mission"]);
 

@@ -22,6 +22,7 @@ pub struct EventQuery {
     #[param(minimum = 1, maximum = 1000)]
     pub limit: Option<usize>,
     /// `next` of the page before.
+    #[param(pattern = "^[0-9]{1,19}$")]
     pub after: Option<String>,
     /// Only this severity and above.
     #[param(inline)]

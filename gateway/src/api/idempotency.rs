@@ -12,7 +12,8 @@ use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use uuid::Uuid;
 
-use super::problem::{ApiError, IDEMPOTENCY_KEY};
+use super::headers::{IDEMPOTENCY_KEY, OPERATOR};
+use super::problem::ApiError;
 use crate::app::App;
 
 /// Keys remembered; the oldest is forgotten first.
@@ -140,7 +141,9 @@ pub async fn layer(State(app): State<App>, mut request: Request, next: Next) -> 
         .await
         .map_err(|_| ApiError::TooLarge(format!("the body could not be read, or has more than {limit} bytes")))?;
     let mut hasher = DefaultHasher::new();
-    (parts.uri.path(), parts.uri.query(), &body[..]).hash(&mut hasher);
+    // Who commands belongs to the request.
+    let operator = parts.headers.get(OPERATOR).map(HeaderValue::as_bytes);
+    (parts.uri.path(), parts.uri.query(), operator, &body[..]).hash(&mut hasher);
     let begun = app.idempotency.lock().unwrap_or_else(PoisonError::into_inner).begin(&key, hasher.finish())?;
     let token = match begun {
         Begin::Replay(answer) => {

@@ -9,8 +9,9 @@ use halcyon_model::{Geodetic, LocalPoint, MissionAction, MissionCommand, Mission
 use super::dto::{CommandResult, CreateMission, Event, Mission, Page, PointInput};
 use super::events::event_page;
 use super::extract::{Asked, Body, Id};
+use super::headers::OPERATOR;
 use super::idempotency::RequestToken;
-use super::page::{MissionCursor, PageQuery, page};
+use super::page::{EventPageQuery, MissionCursor, MissionPageQuery, page};
 use super::problem::ApiError;
 use crate::app::App;
 
@@ -22,9 +23,9 @@ const LOCAL_M_MAX: f64 = 100_000.0;
 const HEIGHT_M_MAX: f64 = 1000.0;
 
 /// Every mission, the newest first.
-#[utoipa::path(get, path = "/api/v1/missions", tag = "missions", operation_id = "list_missions", params(PageQuery),
+#[utoipa::path(get, path = "/api/v1/missions", tag = "missions", operation_id = "list_missions", params(MissionPageQuery),
     responses((status = 200, body = Page<Mission>)))]
-pub async fn list(State(app): State<App>, Asked(query): Asked<PageQuery>) -> Result<Json<Page<Mission>>, ApiError> {
+pub async fn list(State(app): State<App>, Asked(query): Asked<MissionPageQuery>) -> Result<Json<Page<Mission>>, ApiError> {
     let now = app.now();
     let fleet = app.store.read();
     let edge = fleet.edge(now);
@@ -37,7 +38,7 @@ pub async fn list(State(app): State<App>, Asked(query): Asked<PageQuery>) -> Res
         })
         .collect();
     missions.sort_by(|a, b| a.0.cmp(&b.0));
-    page(missions.into_iter(), &query, |kept| Mission::new(&kept.value, &edge)).map(Json)
+    page(missions.into_iter(), &query.into(), |kept| Mission::new(&kept.value, &edge)).map(Json)
 }
 
 /// One mission.
@@ -116,17 +117,17 @@ action!(
 
 /// Events that concern a mission, the newest first.
 #[utoipa::path(get, path = "/api/v1/missions/{id}/events", tag = "missions", operation_id = "list_mission_events",
-    params(("id" = String, Path, pattern = "^[A-Za-z0-9._-]{1,64}$"), PageQuery), responses((status = 200, body = Page<Event>)))]
+    params(("id" = String, Path, pattern = "^[A-Za-z0-9._-]{1,64}$"), EventPageQuery), responses((status = 200, body = Page<Event>)))]
 pub async fn events(
     State(app): State<App>,
     Id(id): Id<MissionId>,
-    Asked(query): Asked<PageQuery>,
+    Asked(query): Asked<EventPageQuery>,
 ) -> Result<Json<Page<Event>>, ApiError> {
     let fleet = app.store.read();
     if fleet.missions.get(&id).is_none() {
         return Err(unknown(&id));
     }
-    event_page(&fleet, &query, |event| event.mission.as_ref() == Some(&id)).map(Json)
+    event_page(&fleet, &query.into(), |event| event.mission.as_ref() == Some(&id)).map(Json)
 }
 
 fn unknown(id: &MissionId) -> ApiError {
@@ -150,9 +151,10 @@ async fn ask(app: &App, headers: &HeaderMap, id: MissionId, action: MissionActio
 
 /// Who commands, for the record: the header `Halcyon-Operator`, or `rest`.
 pub fn operator(headers: &HeaderMap) -> Result<String, ApiError> {
-    let Some(value) = headers.get("halcyon-operator") else { return Ok("rest".into()) };
+    let Some(value) = headers.get(OPERATOR) else { return Ok("rest".into()) };
     match value.to_str().map(str::trim) {
-        Ok(text) if (1..=64).contains(&text.len()) => Ok(text.into()),
+        // A tab passes for visible in HTTP.
+        Ok(text) if (1..=64).contains(&text.len()) && !text.contains('\t') => Ok(text.into()),
         _ => Err(ApiError::BadRequest("Halcyon-Operator must be 1 to 64 visible ASCII characters".into())),
     }
 }

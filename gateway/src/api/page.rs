@@ -11,17 +11,53 @@ use utoipa::IntoParams;
 use super::dto::Page;
 use super::problem::ApiError;
 
-/// Which page of a list.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize, IntoParams)]
-#[serde(deny_unknown_fields)]
-#[into_params(parameter_in = Query)]
+/// Which page of a list, whatever its cursors look like.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct PageQuery {
     /// At most so many items; 100 if left out.
-    #[param(minimum = 1, maximum = 1000)]
     pub limit: Option<usize>,
     /// `next` of the page before.
     pub after: Option<String>,
 }
+
+macro_rules! page_query {
+    ($(#[$doc:meta])* $name:ident, $pattern:literal) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Deserialize, IntoParams)]
+        #[serde(deny_unknown_fields)]
+        #[into_params(parameter_in = Query)]
+        pub struct $name {
+            /// At most so many items; 100 if left out.
+            #[param(minimum = 1, maximum = 1000)]
+            pub limit: Option<usize>,
+            /// `next` of the page before.
+            #[param(pattern = $pattern)]
+            pub after: Option<String>,
+        }
+
+        impl From<$name> for PageQuery {
+            fn from(query: $name) -> Self {
+                Self { limit: query.limit, after: query.after }
+            }
+        }
+    };
+}
+
+page_query!(
+    /// Which page of a list by identifier.
+    IdPageQuery,
+    "^[A-Za-z0-9._-]{1,64}$"
+);
+page_query!(
+    /// Which page of the missions.
+    MissionPageQuery,
+    "^-?[0-9]{1,18}~[A-Za-z0-9._-]{1,64}$"
+);
+page_query!(
+    /// Which page of events.
+    EventPageQuery,
+    "^[0-9]{1,19}$"
+);
 
 /// Most items on a page.
 const LIMIT_MAX: usize = 1000;

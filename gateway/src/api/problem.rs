@@ -1,6 +1,6 @@
 //! The one API error and its one mapping to a response.
 
-use axum::http::{HeaderName, HeaderValue, StatusCode, header};
+use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 
 use super::dto::Problem;
@@ -122,6 +122,3 @@ pub fn name_the_path(mut response: Response, path: &str) -> Response {
     *response.body_mut() = body.into();
     response
 }
-
-/// Header of the idempotency key (draft-ietf-httpapi-idempotency-key-header).
-pub const IDEMPOTENCY_KEY: HeaderName = HeaderName::from_static("idempotency-key");

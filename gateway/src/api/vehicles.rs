@@ -9,19 +9,19 @@ use halcyon_model::{FlightMode, Slot, VehicleAction, VehicleCommand, VehicleId};
 use super::dto::{CommandResult, Page, PointInput, Vehicle, VehicleCommandRequest};
 use super::extract::{Asked, Body, Id};
 use super::missions::{local_point, operator, positive};
-use super::page::{PageQuery, page};
+use super::page::{IdPageQuery, page};
 use super::problem::ApiError;
 use crate::app::App;
 
 /// Every vehicle that was ever heard, by identifier.
-#[utoipa::path(get, path = "/api/v1/vehicles", tag = "vehicles", operation_id = "list_vehicles", params(PageQuery),
+#[utoipa::path(get, path = "/api/v1/vehicles", tag = "vehicles", operation_id = "list_vehicles", params(IdPageQuery),
     responses((status = 200, body = Page<Vehicle>)))]
-pub async fn list(State(app): State<App>, Asked(query): Asked<PageQuery>) -> Result<Json<Page<Vehicle>>, ApiError> {
+pub async fn list(State(app): State<App>, Asked(query): Asked<IdPageQuery>) -> Result<Json<Page<Vehicle>>, ApiError> {
     let now = app.now();
     let fleet = app.store.read();
     let edge = fleet.edge(now);
     let vehicles = fleet.vehicles.iter().map(|(id, kept)| (id.clone(), kept));
-    page(vehicles, &query, |kept| Vehicle::new(&kept.value, kept.stale, &edge)).map(Json)
+    page(vehicles, &query.into(), |kept| Vehicle::new(&kept.value, kept.stale, &edge)).map(Json)
 }
 
 /// One vehicle.
