@@ -35,7 +35,6 @@ async fn start(overrides: &[String]) -> Rig {
 
 impl Rig {
     /// Waits for a health report whose detail holds `part`.
-    #[track_caller]
     #[allow(clippy::unwrap_used, reason = "a helper of tests")]
     async fn health(&mut self, part: &str) -> Health {
         let wanted = async {

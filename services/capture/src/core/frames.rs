@@ -107,8 +107,9 @@ pub fn parse(text: &str) -> Result<Vec<FrameRow>, FramesError> {
         if !names.insert(name.to_owned()) {
             return Err(row.error("name", name, "a name that no frame before it has"));
         }
-        // Earlier than the year 2286, and enough for any clock that starts at 0.
-        let stamp = Stamp::from_secs_f64(row.number("stamp_s", stamp_at, 0.0, 1e10, "seconds since 1970, 0 to 1e10")?);
+        // Up to the year 2255: what a stamp's nanoseconds hold.
+        let stamp_s = row.number("stamp_s", stamp_at, 0.0, 9e9, "seconds since 1970, 0 to 9e9")?;
+        let stamp = exact_stamp(row.text(stamp_at)).unwrap_or(Stamp::from_secs_f64(stamp_s));
         if rows.last().is_some_and(|last| stamp <= last.stamp) {
             return Err(row.error("stamp_s", row.text(stamp_at), "a later time than in the row before"));
         }
@@ -123,6 +124,17 @@ pub fn parse(text: &str) -> Result<Vec<FrameRow>, FramesError> {
         rows.push(FrameRow { name: name.to_owned(), stamp, attitude: attitude.transpose()? });
     }
     if rows.is_empty() { Err(FramesError::Empty) } else { Ok(rows) }
+}
+
+/// Plain decimal seconds to the nanosecond: a double holds a quarter of a microsecond at today's dates.
+fn exact_stamp(text: &str) -> Option<Stamp> {
+    let (whole, fraction) = text.split_once('.').unwrap_or((text, ""));
+    if !fraction.bytes().all(|byte| byte.is_ascii_digit()) {
+        return None;
+    }
+    let whole_s: i64 = whole.parse().ok()?;
+    let nanos: i64 = format!("{fraction:0<9}").get(..9)?.parse().ok()?;
+    Some(Stamp::from_nanos(whole_s.checked_mul(1_000_000_000)?.checked_add(nanos)?))
 }
 
 struct Row<'a> {
@@ -165,6 +177,13 @@ mod tests {
     fn reads_frames_with_and_without_attitude() {
         let rows = parse("name,stamp_s\n000,100.25\n001,100.5\n").unwrap();
         assert_eq!(rows[1], FrameRow { name: "001".into(), stamp: Stamp::from_nanos(100_500_000_000), attitude: None });
+        let fine = &parse("name,stamp_s\na,1750000000.123456789\nb,1.75e9\n");
+        assert!(fine.as_ref().is_err_and(|error| error.to_string().starts_with("line 3: stamp_s")), "{fine:?}");
+        let fine = parse("name,stamp_s\nb,1.75e9\na,1750000000.123456789\n").unwrap();
+        assert_eq!(
+            fine.iter().map(|row| row.stamp.as_nanos()).collect::<Vec<_>>(),
+            [1_750_000_000_000_000_000, 1_750_000_000_123_456_789]
+        );
         let text = "\u{feff}stamp_s, height_m, note, roll_deg, pitch_deg, heading_deg, name\r\n# hover\r\n7, 5.5, x, 0, 0, 90, a.png\r\n";
         let row = &parse(text).unwrap()[0];
         let attitude = row.attitude.unwrap();
@@ -186,7 +205,7 @@ mod tests {
             "name,stamp_s,roll_deg\na,1,2\n",
             "line 1: column pitch_deg is missing: an attitude needs roll_deg, pitch_deg, heading_deg and height_m",
         );
-        check("name,stamp_s\na,1\nb,NaN\n", "line 3: stamp_s is \"NaN\", expected seconds since 1970, 0 to 1e10");
+        check("name,stamp_s\na,1\nb,NaN\n", "line 3: stamp_s is \"NaN\", expected seconds since 1970, 0 to 9e9");
         check("name,stamp_s\na,1\nb\n", "line 3: 1 values, the header has 2");
         check("name,stamp_s\na,2\nb,1\n", "line 3: stamp_s is \"1\", expected a later time than in the row before");
         check("name,stamp_s\na,1\na,2\n", "line 3: name is \"a\", expected a name that no frame before it has");
