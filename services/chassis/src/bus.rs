@@ -132,7 +132,8 @@ impl Bus {
     /// # Errors
     /// [`BusError::Zenoh`] if the session refuses.
     pub async fn subscribe<M: Wire>(&self, topic: &Topic<M>) -> Result<Subscriber<M>, BusError> {
-        let (inbox, guard) = self.listen(&self.key(&topic.key), topic.name, topic.delivery.inbox, topic.delivery.history).await?;
+        let (inbox, guard) =
+            self.listen(&self.key(&topic.key), topic.name, topic.delivery.inbox, topic.delivery.history).await?;
         let refused = metrics::counter!("bus_messages_refused_total", "topic" => topic.name);
         Ok(Subscriber { inbox, _guard: guard, name: topic.name, refused, message: PhantomData })
     }
@@ -199,7 +200,12 @@ impl Bus {
     ///
     /// # Errors
     /// [`CallError`]; a refusal is no error but an answer.
-    pub async fn call<C: Wire>(&self, topic: &CommandTopic<C>, command: &C, timeout: Duration) -> Result<CommandReply, CallError> {
+    pub async fn call<C: Wire>(
+        &self,
+        topic: &CommandTopic<C>,
+        command: &C,
+        timeout: Duration,
+    ) -> Result<CommandReply, CallError> {
         let key = self.key(&topic.key);
         let replies = self
             .session
@@ -285,7 +291,11 @@ fn shared(payload: &ZBytes) -> Bytes {
             self.0.slices().next().unwrap_or_default()
         }
     }
-    if payload.slices().count() <= 1 { Bytes::from_owner(OnePiece(payload.clone())) } else { Bytes::from(payload.to_bytes().into_owned()) }
+    if payload.slices().count() <= 1 {
+        Bytes::from_owner(OnePiece(payload.clone()))
+    } else {
+        Bytes::from(payload.to_bytes().into_owned())
+    }
 }
 
 enum AnyPublisher {

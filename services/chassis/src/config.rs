@@ -140,14 +140,7 @@ impl Settings {
         let mut layers = Figment::new();
         let default = PathBuf::from("halcyon.toml");
         if let Some(path) = file.or_else(|| default.is_file().then_some(default.as_path())) {
-            // figment takes a missing file for an empty one.
-            let text = std::fs::read_to_string(path)
-                .map_err(|error| ConfigError(format!("configuration file {}: {error}", path.display())))?;
-            toml::from_str::<toml::Table>(&text).map_err(|error| {
-                let line = error.span().map_or(0, |span| 1 + text[..span.start.min(text.len())].matches('\n').count());
-                ConfigError(format!("configuration file {}, line {line}: {}", path.display(), error.message()))
-            })?;
-            layers = layers.merge(Toml::file_exact(path));
+            layers = layers.merge(file_layer(path)?);
         }
         // Other HALCYON_ variables (HALCYON_CONFIG, HALCYON_URL) are not settings: settings have a section.
         layers = layers.merge(Env::prefixed("HALCYON_").filter(|key| key.as_str().contains("__")).split("__"));
@@ -155,6 +148,16 @@ impl Settings {
             layers = layers.merge(flag(assignment)?);
         }
         let settings = Self { layers };
+        settings.check_sections()?;
+        Ok(settings)
+    }
+
+    /// Puts a file on top, such as a scenario.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn with_file(self, path: &Path) -> Result<Self, ConfigError> {
+        let settings = Self { layers: self.layers.merge(file_layer(path)?) };
         settings.check_sections()?;
         Ok(settings)
     }
@@ -170,7 +173,7 @@ impl Settings {
     /// # Errors
     /// [`ConfigError`] if a key is unknown, or a value of the wrong type or out of range.
     pub fn section<T: Section>(&self) -> Result<T, ConfigError> {
-        let section: T = self.layered::<T>().extract_inner(T::NAME).map_err(|error| describe_error(&error))?;
+        let section: T = self.layered::<T>().extract_inner(T::NAME).map_err(|error| describe_error(T::NAME, &error))?;
         section.validate().map_err(|problem| ConfigError(format!("[{}] {problem}", T::NAME)))?;
         Ok(section)
     }
@@ -182,7 +185,7 @@ impl Settings {
     pub fn describe<T: Section>(&self) -> Result<Vec<Setting>, ConfigError> {
         self.section::<T>()?;
         let figment = self.layered::<T>();
-        let value = figment.find_value(T::NAME).map_err(|error| describe_error(&error))?;
+        let value = figment.find_value(T::NAME).map_err(|error| describe_error(T::NAME, &error))?;
         let mut settings = Vec::new();
         flatten(T::NAME.to_owned(), &value, &figment, &mut settings);
         Ok(settings)
@@ -193,7 +196,7 @@ impl Settings {
     }
 
     fn check_sections(&self) -> Result<(), ConfigError> {
-        let all: Dict = self.layers.extract().map_err(|error| describe_error(&error))?;
+        let all: Dict = self.layers.extract().map_err(|error| describe_error("", &error))?;
         for name in all.keys() {
             if !SECTIONS.contains(&name.as_str()) {
                 let source = self.layers.find_metadata(name).map(source_of).unwrap_or_default();
@@ -202,6 +205,17 @@ impl Settings {
         }
         Ok(())
     }
+}
+
+/// A TOML file as a layer. figment alone takes a missing file for an empty one, and a syntax error without its line.
+fn file_layer(path: &Path) -> Result<Figment, ConfigError> {
+    let text = std::fs::read_to_string(path)
+        .map_err(|error| ConfigError(format!("configuration file {}: {error}", path.display())))?;
+    toml::from_str::<toml::Table>(&text).map_err(|error| {
+        let line = error.span().map_or(0, |span| 1 + text[..span.start.min(text.len())].matches('\n').count());
+        ConfigError(format!("configuration file {}, line {line}: {}", path.display(), error.message()))
+    })?;
+    Ok(Figment::from(Toml::file_exact(path)))
 }
 
 /// `section.key=value` as a layer.
@@ -258,18 +272,16 @@ fn hint(name: &str, known: &[&str]) -> String {
 }
 
 /// figment's error on one line, with the key's path and source.
-fn describe_error(error: &figment::Error) -> ConfigError {
+fn describe_error(section: &str, error: &figment::Error) -> ConfigError {
     let source = error.metadata.as_ref().map(source_of).unwrap_or_default();
-    let path = error.path.iter().filter(|part| part.as_str() != "default").cloned().collect::<Vec<_>>();
-    let (section, inner) = path.split_first().map_or(("", String::new()), |(section, inner)| (section.as_str(), inner.join(".")));
+    // figment gives the path sometimes from the top and sometimes from the section, with the profile and the field or without.
+    let path = error.path.iter().map(String::as_str).filter(|part| ![section, "default"].contains(part));
     let text = match &error.kind {
-        // serde names the field; figment's path may hold it too.
         Kind::UnknownField(field, known) => {
-            let parent = inner.strip_suffix(field.as_str()).unwrap_or(&inner).trim_end_matches('.');
-            let key = if parent.is_empty() { field.clone() } else { format!("{parent}.{field}") };
-            format!("[{section}] unknown key {key}{}{source}", hint(field, known))
+            let key: Vec<&str> = path.filter(|part| part != field).chain([field.as_str()]).collect();
+            format!("[{section}] unknown key {}{}{source}", key.join("."), hint(field, known))
         }
-        kind => format!("[{section}] {inner}: {kind}{source}"),
+        kind => format!("[{section}] {}: {kind}{source}", path.collect::<Vec<_>>().join(".")),
     };
     ConfigError(text)
 }

@@ -65,7 +65,8 @@ impl Process {
         let clock = Clock::new(&settings.section::<ClockConfig>()?);
         telemetry::init(&log);
         let fleet_id = FleetId::new(&fleet.id)?;
-        let opened = tokio::time::timeout(Duration::from_secs(15), zenoh::open(bus_config.zenoh().map_err(anyhow::Error::from_boxed)?));
+        let opened =
+            tokio::time::timeout(Duration::from_secs(15), zenoh::open(bus_config.zenoh().map_err(anyhow::Error::from_boxed)?));
         let session = match opened.await {
             Ok(session) => session.map_err(|error| anyhow::anyhow!("[bus] the session could not be opened: {error}"))?,
             Err(_) => anyhow::bail!("[bus] the session could not be opened within 15 s; connect = {:?}", bus_config.connect),
@@ -144,7 +145,8 @@ impl Process {
             () = async { while self.services.join_next().await.is_some() {} } => {}
         }
         self.stop.cancel();
-        let drained = tokio::time::timeout(Duration::from_secs(8), async { while self.services.join_next().await.is_some() {} });
+        let drained =
+            tokio::time::timeout(Duration::from_secs(8), async { while self.services.join_next().await.is_some() {} });
         tokio::select! {
             drained = drained => if drained.is_err() {
                 warn!("some services did not stop in time");
@@ -182,17 +184,18 @@ where
     let about = format!("The {name} service of a Halcyon fleet. Example: halcyon-{name} --config fleet.toml");
     let command = clap::Command::new(format!("halcyon-{name}")).version(env!("CARGO_PKG_VERSION")).about(about);
     let matches = <Options as clap::Args>::augment_args(command).get_matches();
-    let outcome = <Options as clap::FromArgMatches>::from_arg_matches(&matches).map_err(anyhow::Error::from).and_then(|options| {
-        let settings = options.settings()?;
-        let config = C::resolve(&settings)?;
-        runtime()?.block_on(async {
-            let fleet: FleetConfig = settings.section()?;
-            let mut process = Process::start(&settings).await?;
-            process.spawn(&fleet.host, config, run).await?;
-            process.wait().await;
-            Ok(())
-        })
-    });
+    let outcome =
+        <Options as clap::FromArgMatches>::from_arg_matches(&matches).map_err(anyhow::Error::from).and_then(|options| {
+            let settings = options.settings()?;
+            let config = C::resolve(&settings)?;
+            runtime()?.block_on(async {
+                let fleet: FleetConfig = settings.section()?;
+                let mut process = Process::start(&settings).await?;
+                process.spawn(&fleet.host, config, run).await?;
+                process.wait().await;
+                Ok(())
+            })
+        });
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => fail(&error),

@@ -80,7 +80,8 @@ async fn attempt(context: &Context, run: impl Future<Output = anyhow::Result<()>
         Ok(Err(error)) => Err(format!("{error:#}")),
         Err(join) if join.is_panic() => {
             let panic = join.into_panic();
-            let text = panic.downcast_ref::<&str>().map(ToString::to_string).or_else(|| panic.downcast_ref::<String>().cloned());
+            let text =
+                panic.downcast_ref::<&str>().map(ToString::to_string).or_else(|| panic.downcast_ref::<String>().cloned());
             Err(format!("panic: {}", text.unwrap_or_else(|| "no message".into())))
         }
         Err(_) => Err("cancelled".into()),

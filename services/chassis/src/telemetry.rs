@@ -42,9 +42,9 @@ impl Section for LogConfig {
     fn validate(&self) -> Result<(), String> {
         EnvFilter::try_new(&self.level).map_err(|error| format!("level {:?}: {error}", self.level))?;
         if !self.metrics_listen.is_empty() {
-            self.metrics_listen
-                .parse::<std::net::SocketAddr>()
-                .map_err(|_| format!("metrics_listen must be an address such as 127.0.0.1:9100, not {:?}", self.metrics_listen))?;
+            self.metrics_listen.parse::<std::net::SocketAddr>().map_err(|_| {
+                format!("metrics_listen must be an address such as 127.0.0.1:9100, not {:?}", self.metrics_listen)
+            })?;
         }
         Ok(())
     }

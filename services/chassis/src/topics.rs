@@ -6,8 +6,8 @@
 use std::marker::PhantomData;
 
 use halcyon_model::{
-    DispatchPlan, Event, Health, InstanceId, Mission, MissionCommand, MissionId, Preview, RigId, SeaState, SimTruth, StereoPair,
-    SurfacePatch, VehicleCommand, VehicleId, VehicleState,
+    DispatchPlan, Event, Health, InstanceId, Mission, MissionCommand, MissionId, Preview, RigId, SeaState, SimTruth,
+    StereoPair, SurfacePatch, VehicleCommand, VehicleId, VehicleState,
 };
 use zenoh::qos::Priority;
 

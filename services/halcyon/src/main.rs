@@ -1,1 +1,5 @@
-fn main() {}
+//! `halcyon`: see `halcyon --help`.
+
+fn main() -> std::process::ExitCode {
+    halcyon::cli::main()
+}

@@ -1,0 +1,74 @@
+//! The command line: flags in, one subcommand called, an exit code out.
+
+mod calibrate;
+mod config;
+mod matching;
+mod mission;
+mod output;
+mod run;
+mod sim;
+mod up;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use halcyon_chassis::{Options, process};
+
+/// Finds calm water and puts a payload on it: a fleet of drones that measures waves and lands on them.
+#[derive(Debug, Parser)]
+#[command(name = "halcyon", version, propagate_version = true, arg_required_else_help = true)]
+#[command(after_help = "Example: halcyon up --auto-approve, then open http://127.0.0.1:8080")]
+struct Cli {
+    #[command(flatten)]
+    options: Options,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Fly the whole fleet in this process, over simulated water, with the dashboard
+    Up(up::Args),
+    /// Run one service, or several in one process, from the configuration
+    Run(run::Args),
+    /// Calibrate a stereo rig from pictures of a checkerboard
+    Calibrate(calibrate::Args),
+    /// Match a rectified pair of pictures to a disparity map
+    Match(matching::Args),
+    /// Create, watch and command missions of a running fleet
+    Mission(mission::Args),
+    /// Simulate: render water to a survey folder, or serve vehicles over MAVLink
+    Sim(sim::Args),
+    /// Print the effective configuration, and where each value came from
+    Config(config::Args),
+}
+
+/// Runs the program.
+#[must_use]
+pub fn main() -> ExitCode {
+    let Cli { options, command } = Cli::parse();
+    let outcome = match command {
+        Command::Up(args) => up::run(&options, args),
+        Command::Run(args) => run::run(&options, &args),
+        Command::Calibrate(args) => calibrate::run(&args),
+        Command::Match(args) => matching::run(&args),
+        Command::Mission(args) => mission::run(args),
+        Command::Sim(args) => sim::run(&options, args),
+        Command::Config(args) => config::run(&options, &args),
+    };
+    match outcome {
+        Ok(code) => code,
+        Err(error) => process::fail(&error),
+    }
+}
+
+/// Bad input: one line on stderr and exit code 2.
+fn bad_input(error: impl std::error::Error) -> anyhow::Error {
+    let mut text = error.to_string();
+    let mut source = error.source();
+    while let Some(cause) = source {
+        text = format!("{text}: {cause}");
+        source = cause.source();
+    }
+    halcyon_chassis::ConfigError::new(text).into()
+}
