@@ -1,5 +1,7 @@
 //! The service against a scripted autopilot on real sockets.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test ends at its first surprise")]
+
 mod peer;
 
 use std::sync::atomic::Ordering;

@@ -81,6 +81,7 @@ pub enum CommandError {
 
 /// What [`Commands::poll`] asks of its caller.
 #[derive(Debug, Clone)]
+#[allow(clippy::large_enum_variant, reason = "short-lived, and only a handful a second")]
 pub enum Effect {
     /// Send this.
     Send(MavMessage),

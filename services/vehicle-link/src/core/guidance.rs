@@ -132,7 +132,7 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
     use proptest::prelude::*;
-    use std::f64::consts::PI;
+    use std::f64::consts::{PI, TAU};
 
     fn leader(heading_rad: f64) -> Motion {
         Motion {
@@ -168,7 +168,7 @@ mod tests {
     proptest! {
         /// The slot's velocity is the time derivative of its position, for a leader on a circle.
         #[test]
-        fn slot_velocity_is_the_derivative(heading in 0.0f64..6.28, rate in -1.0f64..1.0, f in -9.0f64..9.0, r in -9.0f64..9.0) {
+        fn slot_velocity_is_the_derivative(heading in 0.0f64..TAU, rate in -1.0f64..1.0, f in -9.0f64..9.0, r in -9.0f64..9.0) {
             let slot = Slot { forward_m: f, right_m: r, up_m: 1.0 };
             let at = |t: f64| {
                 let leader = Motion {

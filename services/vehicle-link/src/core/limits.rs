@@ -44,7 +44,8 @@ pub struct Limits {
     pub land_mode_height_m: f64,
     /// Height below which a landing is no longer broken off, metres.
     pub commit_height_m: f64,
-    /// Time by which the follower aims ahead of the leader's predicted present, seconds: the transport and control lag.
+    /// Time by which the follower aims ahead of the leader's present, seconds. The age of the leader's state is made up for
+    /// already; this is for a lag of the follower's own autopilot. On the simulated ArduCopter 0 is best.
     pub latency_s: f64,
     /// Flight modes of the leader in which it may be followed. The thesis allowed LOITER; our leader is flown by its own
     /// vehicle-link, in GUIDED, so that is allowed too.
@@ -71,7 +72,7 @@ impl Default for Limits {
             landing_radius_m: 1.0,
             land_mode_height_m: 1.0,
             commit_height_m: 0.5,
-            latency_s: 0.1,
+            latency_s: 0.0,
             leader_modes: vec!["LOITER".into(), "GUIDED".into()],
         }
     }

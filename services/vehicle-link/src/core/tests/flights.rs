@@ -64,8 +64,11 @@ fn a_follower_climbs_to_the_safe_height_joins_its_slot_and_keeps_it_while_the_le
     let mut heading = 1.0f64;
     world.run(36.0, |world| {
         heading += 2.0f64.to_radians();
-        let task =
-            Task::Survey { point: LocalPoint::new(60.0, 20.0), height_m: 5.0, heading_rad: Some(heading.rem_euclid(6.283)) };
+        let task = Task::Survey {
+            point: LocalPoint::new(60.0, 20.0),
+            height_m: 5.0,
+            heading_rad: Some(heading.rem_euclid(std::f64::consts::TAU)),
+        };
         world.plan(&[(0, task), (1, follow("v0", 7.0))], 5.0);
         let (leader, follower) = (&world.copters[0], &world.copters[1]);
         let slot = leader.position + 7.0 * Vector3::new(-leader.heading.sin(), leader.heading.cos(), 0.0);

@@ -1,5 +1,7 @@
 //! What must hold in every flight, tried on many.
 
+use std::f64::consts::TAU;
+
 use halcyon_model::{Activity, LocalPoint, Stamp, Task};
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -48,7 +50,7 @@ proptest! {
     /// Two vehicles cross, at any angle and offset, at the same height.
     #[test]
     fn vehicles_that_cross_keep_their_distance(
-        angle in 0.0f64..6.28, offset in -6.0f64..6.0, height in 5.0f64..7.0,
+        angle in 0.0f64..TAU, offset in -6.0f64..6.0, height in 5.0f64..7.0,
     ) {
         let mut world = World::new(&[(0.0, 0.0), (0.0, -8.0)]);
         let direction = Vector3::new(angle.cos(), angle.sin(), 0.0);
@@ -74,7 +76,7 @@ proptest! {
     /// A leader that goes through wild squares and turns, followers on both sides, one of them changing sides.
     #[test]
     fn followers_keep_their_distance_whatever_the_leader_does(
-        corners in prop::collection::vec((-40.0f64..40.0, -40.0f64..40.0, 0.0f64..6.28), 3..6),
+        corners in prop::collection::vec((-40.0f64..40.0, -40.0f64..40.0, 0.0f64..TAU), 3..6),
         swap_at in 0usize..3,
     ) {
         let mut world = World::new(&[(0.0, 0.0), (0.0, -12.0), (0.0, 12.0)]);

@@ -54,9 +54,7 @@ impl Copter {
         let no = |result| Err(crate::core::commands::CommandError::Refused { result, words: None });
         match command {
             Command::Arm if self.ready && self.mode == FlightMode::Guided => self.armed = true,
-            Command::Arm => return no("failed"),
             Command::Disarm { force } if force || self.on_ground() => self.armed = false,
-            Command::Disarm { .. } => return no("failed"),
             Command::SetMode(mode) => {
                 self.mode = mode;
                 self.setpoint = None;
@@ -65,8 +63,8 @@ impl Copter {
             Command::TakeOff { height_above_home_m } if self.armed && self.mode == FlightMode::Guided => {
                 self.climb_to = Some(height_above_home_m - self.home.z);
             }
-            Command::TakeOff { .. } => return no("failed"),
             Command::SetInterval(_) => {}
+            Command::Arm | Command::Disarm { .. } | Command::TakeOff { .. } => return no("failed"),
         }
         Ok(())
     }
