@@ -71,22 +71,21 @@ fn a_pause_outlives_a_restart() {
 }
 
 #[test]
-fn a_leader_that_went_home_meanwhile_is_sent_again_before_the_dispatch_and_not_after_it() {
-    for (phase, expected) in [(Assessing, Completed), (Landing, Failed)] {
+fn a_leader_that_went_home_meanwhile_ends_the_mission_safely() {
+    for phase in [Transit, Assessing, Clearing, Landing] {
         let mut world = World::new(1, 1);
-        world.verdict = if phase == Assessing { None } else { Some(VerdictState::Safe) };
         world.create("m", spec(60.0, 0.0));
         world.run_to("m", phase, 120.0);
+        world.run(if phase == Transit { 8.0 } else { 1.0 });
         let home = world.vehicle("leader-1").home;
         world.restart(30.0);
         world.vehicle("leader-1").position_m = nalgebra::Vector3::new(home.north_m, home.east_m, 0.0);
         world.vehicle("leader-1").armed = false;
-        world.vehicle("leader-1").activity = halcyon_model::Activity::Idle;
-        if phase == Landing {
-            world.vehicle("leader-1").stuck = true;
-        }
-        world.verdict = Some(VerdictState::Safe);
-        assert_eq!(world.run_to_end("m", 240.0), expected, "{:#?}", world.mission("m").history);
+        world.vehicle("leader-1").activity = halcyon_model::Activity::Landed;
+        assert_eq!(world.run_to_end("m", 40.0), Failed, "{phase:?}: {:#?}", world.mission("m").history);
+        assert!(world.last_why("m").contains("leader-1 is on the ground"), "{}", world.last_why("m"));
+        world.run(60.0);
+        assert!(world.vehicles.iter().all(|vehicle| !vehicle.airborne()), "{phase:?}");
     }
 }
 

@@ -77,7 +77,7 @@ impl WriterThread {
         let waiting = self.progress.waiting.fetch_add(size, Ordering::Relaxed) + size;
         // One that is larger than the whole allowance still goes through an empty queue.
         let full = waiting > self.waiting_max && waiting > size;
-        let sent = if full { Err(NotTaken::Full) } else { self.queue.try_send(sample).map_err(why) };
+        let sent = if full { Err(NotTaken::Full) } else { self.queue.try_send(sample).map_err(|error| why(&error)) };
         if sent.is_err() {
             self.progress.waiting.fetch_sub(size, Ordering::Relaxed);
         }
@@ -95,7 +95,7 @@ impl WriterThread {
     }
 }
 
-fn why(error: TrySendError<Sample>) -> NotTaken {
+fn why(error: &TrySendError<Sample>) -> NotTaken {
     match error {
         TrySendError::Full(_) => NotTaken::Full,
         TrySendError::Disconnected(_) => NotTaken::Gone,

@@ -1,5 +1,7 @@
 //! The recorder and the replay on a bus.
 
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test may")]
+
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 

@@ -1,5 +1,7 @@
 //! What is recorded can be read again: by the MCAP library's own reader, by ours, and after a crash.
 
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test may")]
+
 use std::collections::BTreeMap;
 use std::io::Cursor;
 

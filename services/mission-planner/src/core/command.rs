@@ -13,7 +13,7 @@ use super::record::{Effects, Record};
 /// Characters of a name of a mission or of a person.
 const NAME_MAX: usize = 128;
 /// Steps after which a mission takes no more pauses, so that nobody can make its history grow without end.
-const HISTORY_MAX: usize = 1000;
+const HISTORY_MAX: usize = 300;
 
 /// What a command came to: done, or done before, or refused; each with words.
 enum Outcome {

@@ -34,6 +34,8 @@ struct Known {
     trouble_since: Option<Stamp>,
     /// Since when it has been on the ground or the water.
     down_since: Option<Stamp>,
+    /// Since when it has said that its flight is over.
+    landed_since: Option<Stamp>,
 }
 
 /// All vehicles heard of.
@@ -74,7 +76,8 @@ impl Fleet {
         let down = state.landed == LandedState::OnGround;
         let trouble_since = since(trouble, known.and_then(|known| known.trouble_since));
         let down_since = since(down, known.and_then(|known| known.down_since));
-        self.vehicles.insert(state.vehicle.clone(), Known { state, trouble_since, down_since });
+        let landed_since = since(state.activity == Activity::Landed, known.and_then(|known| known.landed_since));
+        self.vehicles.insert(state.vehicle.clone(), Known { state, trouble_since, down_since, landed_since });
         Ok(())
     }
 
@@ -112,6 +115,12 @@ impl Fleet {
     #[must_use]
     pub(super) fn is_down(&self, vehicle: &VehicleId, for_s: f64, now: Stamp) -> bool {
         self.vehicles.get(vehicle).and_then(|known| known.down_since).is_some_and(|since| now.seconds_since(since) >= for_s)
+    }
+
+    /// Whether a vehicle has said for longer than `for_s` that its flight is over.
+    #[must_use]
+    pub(super) fn has_landed(&self, vehicle: &VehicleId, for_s: f64, now: Stamp) -> bool {
+        self.vehicles.get(vehicle).and_then(|known| known.landed_since).is_some_and(|since| now.seconds_since(since) >= for_s)
     }
 
     /// A vehicle, other than `besides`, whose last known place is within `radius_m` of `point`. However old that knowledge is:
@@ -215,5 +224,5 @@ pub(super) fn role_name(role: Role) -> &'static str {
 fn away_from_home(state: &VehicleState, named: bool, config: &Config) -> Option<String> {
     let from_home = LocalFrame::new(state.home?).ned_from_geodetic(state.position);
     let away_m = from_home.xy().norm();
-    (!named && away_m > config.home_radius_m).then(|| format!("on the ground {:.0} m from its home", away_m))
+    (!named && away_m > config.home_radius_m).then(|| format!("on the ground {away_m:.0} m from its home"))
 }

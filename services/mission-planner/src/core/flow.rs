@@ -44,23 +44,23 @@ fn leader_fault(live: &Live, world: &World<'_>) -> Option<Step> {
     failed(world.fleet.fault(live.mission.leader.as_ref()?, world.now, world.config)?)
 }
 
-/// The same for a leader that must be in the air by now. After a restart of the planner it may have gone home: before the
-/// dispatch it can be sent again.
+/// The same for a leader that must be in the air by now. One that went home while the planner was away is not sent again: it had
+/// its reasons, and vehicles do not take off again by themselves for a task that they have flown.
 fn airborne_leader_fault(live: &Live, world: &World<'_>) -> Option<Step> {
     if let Some(step) = leader_fault(live, world) {
         return Some(step);
     }
     let leader = live.mission.leader.as_ref()?;
-    let dispatched = live.mission.follower.is_some();
-    let just_back = live.recovered && world.now.seconds_since(live.entered) <= world.config.vehicle_lost_s;
-    if just_back && !dispatched && world.fleet.is_down(leader, 0.0, world.now) {
-        return match world.fleet.obstacle(leader, Role::Leader, true, world.now, world.config) {
-            None => Some((MissionPhase::Transit, format!("{leader} had gone home while the planner was away"))),
-            Some(obstacle) => failed(format!("{leader} had gone home while the planner was away, and is {obstacle}")),
-        };
-    }
     let down = world.fleet.is_down(leader, world.config.fault_grace_s, world.now);
     if down { failed(format!("{leader} is on the ground")) } else { None }
+}
+
+/// A vehicle that was to take off, and says that it has landed: it came back by itself, or will not fly the same task again.
+fn landed_again(vehicle: &VehicleId, live: &Live, world: &World<'_>) -> Option<String> {
+    let patience_s = world.config.fault_grace_s;
+    let waited = world.now.seconds_since(live.entered) >= patience_s;
+    let landed = waited && world.fleet.has_landed(vehicle, patience_s, world.now);
+    landed.then(|| format!("{vehicle} is on the ground, and does not take off"))
 }
 
 fn follower_fault(live: &Live, world: &World<'_>) -> Option<String> {
@@ -95,7 +95,9 @@ fn transit(live: &mut Live, world: &World<'_>) -> Option<Step> {
         live.on_station(settled.stamp, world.config);
         return Some((MissionPhase::Assessing, why));
     }
-    leader_fault(live, world).or_else(|| overdue(live, world, world.config.transit_max_s, "the leader did not get there"))
+    leader_fault(live, world)
+        .or_else(|| failed(landed_again(live.mission.leader.as_ref()?, live, world)?))
+        .or_else(|| overdue(live, world, world.config.transit_max_s, "the leader did not get there"))
 }
 
 /// What ends every phase in which the leader holds over the spot.
@@ -213,6 +215,7 @@ fn joining(live: &mut Live, world: &World<'_>, taken: &BTreeSet<VehicleId>) -> O
     }
     let late = world.now.seconds_since(live.entered) > world.config.joining_max_s;
     let fault = follower_fault(live, world)
+        .or_else(|| landed_again(live.mission.follower.as_ref()?, live, world))
         .or_else(|| late.then(|| format!("the follower did not join within {:.0} s", world.config.joining_max_s)))?;
     let lost = live.mission.follower.take()?;
     live.tried.insert(lost.clone());

@@ -1,6 +1,7 @@
 //! A world for the planner: vehicles that fly straight lines by its plans, water whose verdict the test sets, and a store. What
 //! must hold at all times is checked at every step, independently of how the planner comes to it.
 #![allow(dead_code, unreachable_pub, reason = "each test uses its part")]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test may")]
 
 mod vehicle;
 

@@ -1,5 +1,7 @@
 //! A vehicle that does what the newest plan says, in straight lines, and stops when the plan lapses.
 
+#![allow(clippy::collapsible_match, reason = "guards that fly would be worse")]
+
 use halcyon_model::{
     Activity, DispatchPlan, FlightMode, Geodetic, LandedState, LocalFrame, LocalPoint, Role, Stamp, Task, VehicleId,
     VehicleState, VerdictState,
@@ -36,6 +38,8 @@ pub struct FakeVehicle {
     pub at_height_since: Option<Stamp>,
     there_since: Option<Stamp>,
     task: Option<Task>,
+    /// What it flew last: it does not take off again for the same.
+    flown: Option<Task>,
     plan_until: Stamp,
 }
 
@@ -59,6 +63,7 @@ impl FakeVehicle {
             at_height_since: None,
             there_since: None,
             task: None,
+            flown: None,
             plan_until: Stamp::default(),
         }
     }
@@ -156,6 +161,9 @@ impl FakeVehicle {
                 }
             }
         }
+        if self.airborne() {
+            self.flown.clone_from(&self.task);
+        }
         if self.position_m.z < 2.0 {
             self.at_height_since = None;
         } else {
@@ -166,6 +174,10 @@ impl FakeVehicle {
     fn take_off(&mut self, height_m: f64, step_s: f64) -> bool {
         if self.airborne() && self.activity != Activity::TakingOff {
             return true;
+        }
+        if !self.airborne() && self.flown.is_some() && self.flown == self.task {
+            self.activity = Activity::Landed;
+            return false;
         }
         if !self.armed && !self.ready {
             self.activity = Activity::Preparing;
