@@ -30,7 +30,8 @@ pub struct Limits {
     pub follow_acceleration_mps2: f64,
     /// Least distance to every flying vehicle, metres; at least 5 (thesis §6.8).
     pub separation_m_min: f64,
-    /// Distance kept on top of `separation_m_min` for control lag and position noise, metres.
+    /// Distance kept on top of `separation_m_min` for control lag and position noise, metres. A slot nearer than both together is
+    /// kept at their sum.
     pub separation_margin_m: f64,
     /// Least distance to a vehicle that stands disarmed, metres: it can't move, and homes lie close together.
     pub separation_parked_m: f64,
@@ -65,7 +66,7 @@ impl Default for Limits {
             acceleration_mps2: 1.5,
             follow_acceleration_mps2: 3.0,
             separation_m_min: 5.0,
-            separation_margin_m: 0.5,
+            separation_margin_m: 1.0,
             separation_parked_m: 3.0,
             settle_radius_m: 1.0,
             settle_s: 2.0,
