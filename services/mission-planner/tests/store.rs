@@ -1,5 +1,7 @@
 //! The store: what it refuses to open, and that it keeps what it was given.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test may")]
+
 use std::fs;
 use std::path::Path;
 
