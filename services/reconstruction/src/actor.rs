@@ -30,7 +30,11 @@ pub async fn run(context: Context, config: Config) -> anyhow::Result<()> {
     let mut pairs = context.bus.subscribe(&topics::pair(&rig)).await?;
     let surfaces = context.bus.publisher(&topics::surface(&rig)).await?;
     let previews = context.bus.publisher(&topics::preview(&rig)).await?;
-    let mut shell = Shell { reconstructor: Some(Reconstructor::new(settings)), preview: PreviewPacer::new(config.preview_rate_hz), failures: 0 };
+    let mut shell = Shell {
+        reconstructor: Some(Reconstructor::new(settings)),
+        preview: PreviewPacer::new(config.preview_rate_hz),
+        failures: 0,
+    };
     context.health.ready(format!("waiting for pairs of {rig}"));
     loop {
         let pair = tokio::select! {
@@ -75,7 +79,11 @@ impl Shell {
                 histogram!("reconstruction_pair_seconds").record(patch.processing_s);
                 counter!("reconstruction_patches_total").increment(1);
                 trace!(%rig, sequence, points = patch.points, coverage = patch.coverage, "patch");
-                context.health.ready(format!("{:.0} ms a pair, coverage {:.0} %", patch.processing_s * 1e3, patch.coverage * 100.0));
+                context.health.ready(format!(
+                    "{:.0} ms a pair, coverage {:.0} %",
+                    patch.processing_s * 1e3,
+                    patch.coverage * 100.0
+                ));
                 surfaces.put(&patch).await?;
             }
             Err(error) => {
@@ -86,11 +94,16 @@ impl Shell {
                     warn!(%rig, error = &error as &dyn std::error::Error, "no water surface in {FAILURES_MAX} pairs in a row");
                 }
                 if self.failures >= FAILURES_MAX {
-                    context.health.degraded(format!("no patch from the last {} pairs: {:#}", self.failures, anyhow::Error::from(error)));
+                    context.health.degraded(format!(
+                        "no patch from the last {} pairs: {:#}",
+                        self.failures,
+                        anyhow::Error::from(error)
+                    ));
                 }
             }
         }
         if let Some(preview) = work.preview {
+            self.preview.done(preview.stamp);
             previews.put(&preview).await?;
         }
         Ok(())
@@ -125,14 +138,14 @@ impl PreviewPacer {
         Self { period: (rate_hz > 0.0).then(|| Duration::from_secs_f64(1.0 / rate_hz)), last: None }
     }
 
-    fn is_due(&mut self, now: Stamp) -> bool {
+    fn is_due(&self, now: Stamp) -> bool {
         let Some(period) = self.period else { return false };
         // A stamp that went back is a restarted source: start over.
-        let due = self.last.is_none_or(|last| now < last || now >= last + period);
-        if due {
-            self.last = Some(now);
-        }
-        due
+        self.last.is_none_or(|last| now < last || now >= last + period)
+    }
+
+    fn done(&mut self, stamp: Stamp) {
+        self.last = Some(stamp);
     }
 }
 
@@ -143,9 +156,16 @@ mod tests {
     #[test]
     fn previews_keep_their_distance() {
         let mut pacer = PreviewPacer::new(1.0);
-        let due: Vec<bool> = (0..11).map(|i| pacer.is_due(Stamp::from_nanos(1_000_000_000 + i * 200_000_000))).collect();
-        assert_eq!(due.iter().filter(|due| **due).count(), 3);
-        assert!(due[0] && due[5] && due[10]);
+        let mut shown = Vec::new();
+        for i in 0..11 {
+            let stamp = Stamp::from_nanos(1_000_000_000 + i * 200_000_000);
+            // The sixth pair makes no patch and so no preview: the next one is shown instead.
+            if pacer.is_due(stamp) && i != 5 {
+                pacer.done(stamp);
+                shown.push(i);
+            }
+        }
+        assert_eq!(shown, [0, 6]);
         assert!(pacer.is_due(Stamp::from_nanos(0)), "a restarted source is shown at once");
         assert!(!PreviewPacer::new(0.0).is_due(Stamp::from_nanos(1)));
     }

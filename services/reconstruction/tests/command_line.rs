@@ -1,6 +1,11 @@
 //! The command-line entry points with real files, and with everything that is wrong with files.
 
-#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, reason = "tests fail by panicking and print what they measured")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "tests fail by panicking and print what they measured"
+)]
 
 mod support;
 
@@ -26,7 +31,10 @@ fn calibrate_writes_a_rig_that_reads_back() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("rig.yaml");
     let mut steps = Vec::new();
-    let report = cli::calibrate(&sample_glob("left"), &sample_glob("right"), "9x6", 0.025, Some(&out), &mut |done, total| steps.push((done, total))).unwrap();
+    let report = cli::calibrate(&sample_glob("left"), &sample_glob("right"), "9x6", 0.025, Some(&out), &mut |done, total| {
+        steps.push((done, total))
+    })
+    .unwrap();
     assert_eq!(steps, (1..=13).map(|done| (done, 13)).collect::<Vec<_>>());
     assert!(report.stereo_rms_px <= 0.46, "{report:?}");
     assert!(report.views[0].left.ends_with("left01.jpg") && report.views[12].right.ends_with("right14.jpg"));
@@ -35,7 +43,16 @@ fn calibrate_writes_a_rig_that_reads_back() {
     assert_eq!(rig.left.fx_px, report.left.fx_px);
     assert_eq!(rig.baseline_m(), report.baseline_m);
     let json = serde_json::to_value(&report).unwrap();
-    for key in ["views_total", "views_used", "corners_total", "corners_rejected", "stereo_rms_px", "baseline_m", "row_error_rms_px", "row_error_max_px"] {
+    for key in [
+        "views_total",
+        "views_used",
+        "corners_total",
+        "corners_rejected",
+        "stereo_rms_px",
+        "baseline_m",
+        "row_error_rms_px",
+        "row_error_max_px",
+    ] {
         assert!(json[key].is_number(), "{key}");
     }
     for side in ["left", "right"] {
@@ -55,13 +72,21 @@ fn bad_input_to_calibrate_is_named() {
 
     assert!(matches!(calibrate(&nowhere, &right, "9x6", None), Err(CalibrateCliError::Glob(_))));
     assert!(matches!(calibrate(&left, &first("right"), "9x6", None), Err(CalibrateCliError::Unpaired { left: 13, right: 1 })));
-    assert!(matches!(calibrate("/nowhere/a.jpg", "/nowhere/b.jpg", "9x6", None), Err(CalibrateCliError::File(FileError::Read { .. }))));
+    assert!(matches!(
+        calibrate("/nowhere/a.jpg", "/nowhere/b.jpg", "9x6", None),
+        Err(CalibrateCliError::File(FileError::Read { .. }))
+    ));
     let too_few = calibrate(&first("left"), &first("right"), "9x6", None);
-    assert!(matches!(too_few, Err(CalibrateCliError::Calibrate(CalibrateError::TooFewViews { views: 1, usable: 1 }))), "{too_few:?}");
+    assert!(
+        matches!(too_few, Err(CalibrateCliError::Calibrate(CalibrateError::TooFewViews { views: 1, usable: 1 }))),
+        "{too_few:?}"
+    );
     let other_board = calibrate(&first("left"), &first("right"), "8x5", None);
     let seen = |seen_cols, seen_rows| (seen_cols, seen_rows) == (9, 6) || (seen_cols, seen_rows) == (6, 9);
     match other_board {
-        Err(CalibrateCliError::Calibrate(CalibrateError::WrongBoard { cols: 8, rows: 5, seen_cols, seen_rows })) => assert!(seen(seen_cols, seen_rows)),
+        Err(CalibrateCliError::Calibrate(CalibrateError::WrongBoard { cols: 8, rows: 5, seen_cols, seen_rows })) => {
+            assert!(seen(seen_cols, seen_rows))
+        }
         other => panic!("{other:?}"),
     }
     let mixed = calibrate(&first("left"), &samples().join("aloeL.jpg").to_string_lossy(), "9x6", None);
@@ -87,7 +112,10 @@ fn shifted_pair(folder: &Path, shift: usize) -> (String, String) {
         let rows = aloe.pixels().chunks_exact(aloe.width_px() as usize).skip(300).take(height);
         rows.flat_map(|row| row[200 + from..][..width].to_vec()).collect()
     };
-    (write_pgm(folder, "left.pgm", width as u32, height as u32, &crop(0)), write_pgm(folder, "right.pgm", width as u32, height as u32, &crop(shift)))
+    (
+        write_pgm(folder, "left.pgm", width as u32, height as u32, &crop(0)),
+        write_pgm(folder, "right.pgm", width as u32, height as u32, &crop(shift)),
+    )
 }
 
 #[test]
@@ -118,7 +146,9 @@ fn bad_input_to_match_is_named() {
     let (left, right) = shifted_pair(folder.path(), 20);
     let small = write_pgm(folder.path(), "small.pgm", 4, 4, &[7; 16]);
     let out = folder.path().join("d.pfm");
-    let run = |left: &str, right: &str, max: f64, engine: &str, out: &Path| cli::match_pair(left.as_ref(), right.as_ref(), max, engine, out);
+    let run = |left: &str, right: &str, max: f64, engine: &str, out: &Path| {
+        cli::match_pair(left.as_ref(), right.as_ref(), max, engine, out)
+    };
 
     for max in [0.0, -16.0, f64::NAN, f64::INFINITY, 320.0, 1e12] {
         let refused = run(&left, &right, max, "sgbm", &out);
@@ -127,10 +157,19 @@ fn bad_input_to_match_is_named() {
     assert!(matches!(run(&left, &right, 32.0, "elas", &out), Err(MatchCliError::Engine(_))));
     assert!(matches!(run(&left, &small, 32.0, "bm", &out), Err(MatchCliError::Match(_))));
     assert!(matches!(run(&small, &small, 3.0, "sgbm", &out), Err(MatchCliError::Match(_))));
-    assert!(matches!(run(&left, &right, 32.0, "bm", Path::new("/nowhere/d.pfm")), Err(MatchCliError::File(FileError::Write { .. }))));
-    assert!(matches!(run(&left, &right, 32.0, "bm", Path::new("d.tiff")), Err(MatchCliError::File(FileError::Extension { .. }))));
+    assert!(matches!(
+        run(&left, &right, 32.0, "bm", Path::new("/nowhere/d.pfm")),
+        Err(MatchCliError::File(FileError::Write { .. }))
+    ));
+    assert!(matches!(
+        run(&left, &right, 32.0, "bm", Path::new("d.tiff")),
+        Err(MatchCliError::File(FileError::Extension { .. }))
+    ));
     assert!(matches!(run(&left, "/nowhere.jpg", 32.0, "bm", &out), Err(MatchCliError::File(FileError::Read { .. }))));
-    assert!(matches!(run(&left, folder.path().to_str().unwrap(), 32.0, "bm", &out), Err(MatchCliError::File(FileError::Read { .. }))));
+    assert!(matches!(
+        run(&left, folder.path().to_str().unwrap(), 32.0, "bm", &out),
+        Err(MatchCliError::File(FileError::Read { .. }))
+    ));
     assert!(!out.exists(), "nothing is written for bad input");
 }
 

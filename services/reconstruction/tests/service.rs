@@ -1,6 +1,11 @@
 //! The actor on a private bus: pairs go in, patches and previews come out.
 
-#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, reason = "tests fail by panicking and print what they measured")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "tests fail by panicking and print what they measured"
+)]
 
 mod support;
 

@@ -1,6 +1,11 @@
 //! The chain against water that is known exactly: pinhole rays on a formula, nothing shared with what is tested.
 
-#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, reason = "tests fail by panicking and print what they measured")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "tests fail by panicking and print what they measured"
+)]
 
 mod support;
 
@@ -54,7 +59,11 @@ fn check(rig: &RigCalibration, attitude_deg: [f64; 3], surface: Surface<'_>, noi
     let errors = errors(&patch, surface);
     println!(
         "rms {:.2} mm, error/sigma {:.2}, level {:+.2} mm, coverage {:.3}, {} points",
-        errors.rms_m * 1e3, errors.ratio, errors.level_m * 1e3, patch.coverage, patch.points
+        errors.rms_m * 1e3,
+        errors.ratio,
+        errors.level_m * 1e3,
+        patch.coverage,
+        patch.points
     );
     assert!(errors.rms_m <= rms_m_max, "rms {} m", errors.rms_m);
     assert!((0.5..2.0).contains(&errors.ratio), "error/sigma {}", errors.ratio);
@@ -101,8 +110,15 @@ fn a_high_wave() {
 #[test]
 fn a_real_rig_with_distortion_toe_in_and_offset_mount() {
     let mut rig = default_rig();
-    rig.left = CameraIntrinsics { fx_px: 345.0, fy_px: 344.0, cx_px: 163.0, cy_px: 117.0, distortion: [-0.2, 0.05, 8e-4, -6e-4, 0.0] };
-    rig.right = CameraIntrinsics { fx_px: 339.0, fy_px: 340.0, cx_px: 156.0, cy_px: 121.5, distortion: [-0.19, 0.045, -5e-4, 4e-4, 0.0] };
+    rig.left =
+        CameraIntrinsics { fx_px: 345.0, fy_px: 344.0, cx_px: 163.0, cy_px: 117.0, distortion: [-0.2, 0.05, 8e-4, -6e-4, 0.0] };
+    rig.right = CameraIntrinsics {
+        fx_px: 339.0,
+        fy_px: 340.0,
+        cx_px: 156.0,
+        cy_px: 121.5,
+        distortion: [-0.19, 0.045, -5e-4, 4e-4, 0.0],
+    };
     rig.right_from_left = Rotation3::from_euler_angles(0.01, -0.02, 0.015).into_inner();
     rig.right_from_left_m = rig.right_from_left * Vector3::new(-0.4, 0.01, -0.008);
     rig.camera_in_body_m = Vector3::new(0.1, -0.2, 0.05);
@@ -160,18 +176,20 @@ fn attitude_noise_is_not_mistaken_for_waves() {
     let truth = pose(0.0, 0.0, 5.0, [0.0, 0.0, 20.0]);
     let still = render(&default_rig(), &truth, &|_, _| 0.0, 2.0, 5);
     let (mut last_rms_m, mut literal_rms_m, mut pairs) = (0.0, 0.0, 0.0);
-    for i in 0..60 {
+    for i in 0..150 {
         let mut pair = still.clone();
         pair.stamp = Stamp::from_secs_f64(f64::from(i) * 0.2);
         let mut noisy = truth;
-        noisy.ned_from_body = truth.ned_from_body * UnitQuaternion::from_euler_angles(sigma_rad * normal(&mut random), sigma_rad * normal(&mut random), 0.0);
-        noisy.attitude_sigma_rad = 0.0;
-        pair.pose = Some(noisy);
-        let literal = Reconstructor::new(Settings::default()).reconstruct(&pair).unwrap();
+        noisy.ned_from_body = truth.ned_from_body
+            * UnitQuaternion::from_euler_angles(sigma_rad * normal(&mut random), sigma_rad * normal(&mut random), 0.0);
         noisy.attitude_sigma_rad = sigma_rad;
         pair.pose = Some(noisy);
         let patch = reconstructor.reconstruct(&pair).unwrap();
-        if i >= 20 {
+        // Half a minute at 5 Hz; the second half counts.
+        if i >= 75 {
+            noisy.attitude_sigma_rad = 0.0;
+            pair.pose = Some(noisy);
+            let literal = Reconstructor::new(Settings::default()).reconstruct(&pair).unwrap();
             last_rms_m += errors(&patch, &|_, _| 0.0).rms_m.powi(2);
             literal_rms_m += errors(&literal, &|_, _| 0.0).rms_m.powi(2);
             pairs += 1.0;
@@ -187,7 +205,12 @@ fn attitude_noise_is_not_mistaken_for_waves() {
 #[test]
 fn the_same_pairs_give_the_same_patches() {
     let pair = render(&default_rig(), &pose(0.0, 0.0, 5.0, [1.0, 2.0, 3.0]), &wave(0.02, 2.0), 2.0, 9);
-    let once = || Reconstructor::new(Settings::default()).reconstruct(&pair).map(|patch| (patch.plane, patch.points, patch.grid.rows)).unwrap();
+    let once = || {
+        Reconstructor::new(Settings::default())
+            .reconstruct(&pair)
+            .map(|patch| (patch.plane, patch.points, patch.grid.rows))
+            .unwrap()
+    };
     assert_eq!(once(), once());
 }
 
@@ -214,7 +237,10 @@ fn what_cannot_be_measured_is_an_error() {
     assert!(matches!(reconstructor.reconstruct(&pair), Err(ReconstructError::Rectify(_))), "no number");
 
     let pair = render(&default_rig(), &pose(0.0, 0.0, 0.2, [0.0; 3]), &|_, _| 0.0, 2.0, 1);
-    assert!(matches!(reconstructor.reconstruct(&pair), Err(ReconstructError::TooClose { .. })), "a hand's breadth above the water");
+    assert!(
+        matches!(reconstructor.reconstruct(&pair), Err(ReconstructError::TooClose { .. })),
+        "a hand's breadth above the water"
+    );
 
     assert!(reconstructor.reconstruct(&good).is_ok(), "and none of it does any harm");
     assert!(reconstructor.preview().unwrap().is_some());
@@ -224,7 +250,12 @@ fn what_cannot_be_measured_is_an_error() {
 fn every_engine_measures() {
     for engine in halcyon_reconstruction::core::matcher::Engine::ALL {
         let pair = render(&default_rig(), &pose(0.0, 0.0, 5.0, [0.0; 3]), &wave(0.0177, 2.6), 2.0, 1);
-        let settings = Settings { engine, block_px: engine.block_px_default(), range: DisparityRange { min_px: 0, max_px: 63 }, ..Settings::default() };
+        let settings = Settings {
+            engine,
+            block_px: engine.block_px_default(),
+            range: DisparityRange { min_px: 0, max_px: 63 },
+            ..Settings::default()
+        };
         let patch = Reconstructor::new(settings).reconstruct(&pair).unwrap();
         let rms_m = errors(&patch, &wave(0.0177, 2.6)).rms_m;
         assert!(rms_m < 0.006, "{} {rms_m}", engine.name());

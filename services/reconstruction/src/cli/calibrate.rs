@@ -153,8 +153,11 @@ pub fn calibrate(
     if left.len() != right.len() {
         return Err(CalibrateCliError::Unpaired { left: left.len(), right: right.len() });
     }
-    let views: Vec<(Image, Image)> =
-        left.iter().zip(&right).map(|(left, right)| Ok((read_picture(left)?, read_picture(right)?))).collect::<Result<_, FileError>>()?;
+    let views: Vec<(Image, Image)> = left
+        .iter()
+        .zip(&right)
+        .map(|(left, right)| Ok((read_picture(left)?, read_picture(right)?)))
+        .collect::<Result<_, FileError>>()?;
     let calibration = calibrate_with(&views, board, progress)?;
     if let Some(out) = out {
         write_bytes(out, halcyon_model::rig_yaml::write(&calibration.rig).as_bytes())?;
@@ -163,15 +166,20 @@ pub fn calibrate(
 }
 
 fn parse_board(text: &str, square_m: f64) -> Result<BoardSpec, CalibrateCliError> {
-    let sides = text.split_once(['x', 'X', '×']).and_then(|(cols, rows)| Some((cols.trim().parse().ok()?, rows.trim().parse().ok()?)));
+    let sides =
+        text.split_once(['x', 'X', '×']).and_then(|(cols, rows)| Some((cols.trim().parse().ok()?, rows.trim().parse().ok()?)));
     let (cols, rows) = sides.ok_or_else(|| CalibrateCliError::Board(text.chars().take(40).collect()))?;
     Ok(BoardSpec::new(cols, rows, square_m)?)
 }
 
 fn report(calibration: &Calibration, left: &[PathBuf], right: &[PathBuf]) -> CalibrateReport {
     let rig = &calibration.rig;
-    let views: Vec<ViewReport> =
-        calibration.views.iter().zip(left.iter().zip(right)).map(|(view, (left, right))| ViewReport::new(left, right, view)).collect();
+    let views: Vec<ViewReport> = calibration
+        .views
+        .iter()
+        .zip(left.iter().zip(right))
+        .map(|(view, (left, right))| ViewReport::new(left, right, view))
+        .collect();
     CalibrateReport {
         views_total: views.len(),
         views_used: views.iter().filter(|view| view.used).count(),

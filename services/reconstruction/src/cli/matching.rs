@@ -55,7 +55,13 @@ pub struct MatchReport {
 ///
 /// # Errors
 /// [`MatchCliError`]: one line that says which file or what number is at fault.
-pub fn match_pair(left: &Path, right: &Path, max_disparity_px: f64, engine: &str, out: &Path) -> Result<MatchReport, MatchCliError> {
+pub fn match_pair(
+    left: &Path,
+    right: &Path,
+    max_disparity_px: f64,
+    engine: &str,
+    out: &Path,
+) -> Result<MatchReport, MatchCliError> {
     let engine: Engine = engine.parse()?;
     let extension = out.extension().map(|extension| extension.to_ascii_lowercase());
     let as_png = match extension.as_deref().and_then(std::ffi::OsStr::to_str) {

@@ -251,7 +251,10 @@ mod tests {
 
     #[test]
     fn nonsense_is_refused() {
-        let far = [SurfacePoint { north_m: 1e9, east_m: 0.0, up_m: 0.0, sigma_m: 0.1 }, SurfacePoint { north_m: 0.0, east_m: 0.0, up_m: 0.0, sigma_m: 0.1 }];
+        let far = [
+            SurfacePoint { north_m: 1e9, east_m: 0.0, up_m: 0.0, sigma_m: 0.1 },
+            SurfacePoint { north_m: 0.0, east_m: 0.0, up_m: 0.0, sigma_m: 0.1 },
+        ];
         assert!(matches!(Gridder::default().grid(&far, 0.1, SAMPLING), Err(GridError::TooLarge { .. })));
         assert_eq!(Gridder::default().grid(&[], 0.1, SAMPLING), Err(GridError::Empty));
     }

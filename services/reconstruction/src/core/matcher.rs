@@ -8,7 +8,7 @@ use std::str::FromStr;
 pub use block::BlockMatcher;
 use halcyon_model::Image;
 use opencv::core::{self as cvcore, BORDER_REPLICATE, Mat, MatTraitConst, MatTraitConstManual, Rect};
-pub use sgbm::{SgbmMode, SemiGlobalMatcher};
+pub use sgbm::{SemiGlobalMatcher, SgbmMode};
 
 use super::cv;
 use super::disparity::Disparity;
@@ -37,7 +37,9 @@ impl DisparityRange {
 #[derive(Debug, thiserror::Error)]
 pub enum MatchError {
     /// The two pictures differ in size.
-    #[error("the left picture is {left_width_px}x{left_height_px} px, the right one {right_width_px}x{right_height_px}: they must be of one size")]
+    #[error(
+        "the left picture is {left_width_px}x{left_height_px} px, the right one {right_width_px}x{right_height_px}: they must be of one size"
+    )]
     Sizes {
         /// Left width.
         left_width_px: u32,
@@ -87,7 +89,12 @@ pub trait Matcher: Send {
 ///
 /// # Errors
 /// As [`Matcher::compute`].
-pub fn match_images(matcher: &mut dyn Matcher, left: &Image, right: &Image, range: DisparityRange) -> Result<Disparity, MatchError> {
+pub fn match_images(
+    matcher: &mut dyn Matcher,
+    left: &Image,
+    right: &Image,
+    range: DisparityRange,
+) -> Result<Disparity, MatchError> {
     let mut disparity = Disparity::default();
     let (left, right) = (cv::mat_from_image(left)?.clone_pointee(), cv::mat_from_image(right)?.clone_pointee());
     matcher.compute(&left, &right, range, &mut disparity)?;
@@ -105,7 +112,8 @@ pub enum Engine {
 
 impl Engine {
     /// Every engine that can be asked for.
-    pub const ALL: [Self; 4] = [Self::Bm, Self::Sgbm(SgbmMode::FivePaths), Self::Sgbm(SgbmMode::ThreePaths), Self::Sgbm(SgbmMode::EightPaths)];
+    pub const ALL: [Self; 4] =
+        [Self::Bm, Self::Sgbm(SgbmMode::FivePaths), Self::Sgbm(SgbmMode::ThreePaths), Self::Sgbm(SgbmMode::EightPaths)];
 
     /// As in configuration and on the command line.
     #[must_use]

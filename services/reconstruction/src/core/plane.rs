@@ -67,7 +67,8 @@ pub fn fit(matches: &mut Vec<Match>, rig: &RectifiedRig, points_min: usize, seed
     // Drawn, not every so many: matches come in rows, and a regular step would see only a few columns, perhaps all crests.
     let judges: Vec<Match> = (0..JUDGES).map(|_| matches[random.random_range(0..matches.len())]).collect();
     let mut deviations = Vec::with_capacity(JUDGES);
-    let (mut plane_px, mut sigma_px) = least_median(matches, &judges, &mut random, &mut deviations).ok_or(PlaneError::NoPlane)?;
+    let (mut plane_px, mut sigma_px) =
+        least_median(matches, &judges, &mut random, &mut deviations).ok_or(PlaneError::NoPlane)?;
     let mut limit_px = OUTLIER_PX_MIN;
     for _ in 0..ROUNDS {
         limit_px = (OUTLIER_SIGMAS * sigma_px).max(OUTLIER_PX_MIN);
@@ -133,7 +134,12 @@ impl DisparityPlane {
 const MEDIAN_PER_SIGMA: f32 = 0.6745;
 
 /// The plane with the least median deviation, and the standard deviation that this median stands for.
-fn least_median(matches: &[Match], judges: &[Match], random: &mut ChaCha8Rng, deviations: &mut Vec<f32>) -> Option<(DisparityPlane, f32)> {
+fn least_median(
+    matches: &[Match],
+    judges: &[Match],
+    random: &mut ChaCha8Rng,
+    deviations: &mut Vec<f32>,
+) -> Option<(DisparityPlane, f32)> {
     let mut best: Option<(DisparityPlane, f32)> = None;
     for _ in 0..HYPOTHESES {
         let [p, q, r] = std::array::from_fn(|_| &matches[random.random_range(0..matches.len())]);
@@ -244,10 +250,14 @@ mod tests {
         let mut chaos = matches(Vector3::z(), 5.0, 0.0);
         let mut random = ChaCha8Rng::seed_from_u64(1);
         for m in &mut chaos {
-            m.disparity_px = if random.random_bool(0.5) { random.random_range(0.1..8.0) } else { random.random_range(90.0..250.0) };
+            m.disparity_px =
+                if random.random_bool(0.5) { random.random_range(0.1..8.0) } else { random.random_range(90.0..250.0) };
         }
         let plane = fit(&mut chaos, &RIG, 100, 1);
-        assert!(plane.is_err() || plane.is_ok_and(|plane| plane.rms_m > 0.2), "a plane through chaos must at least say how bad it is");
+        assert!(
+            plane.is_err() || plane.is_ok_and(|plane| plane.rms_m > 0.2),
+            "a plane through chaos must at least say how bad it is"
+        );
         assert!(matches!(fit(&mut Vec::new(), &RIG, 100, 1), Err(PlaneError::TooFewPoints { points: 0, needed: 100 })));
     }
 }

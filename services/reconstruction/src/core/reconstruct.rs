@@ -183,7 +183,12 @@ impl Reconstructor {
     pub fn preview(&self) -> Result<Option<Preview>, ReconstructError> {
         let (Some((stamp, rig)), Some(rectifier)) = (&self.last_pair, &self.rectifier) else { return Ok(None) };
         let mut left_jpeg = Vector::<u8>::new();
-        imgcodecs::imencode(".jpg", rectifier.grey().0, &mut left_jpeg, &Vector::from_slice(&[imgcodecs::IMWRITE_JPEG_QUALITY, 80]))?;
+        imgcodecs::imencode(
+            ".jpg",
+            rectifier.grey().0,
+            &mut left_jpeg,
+            &Vector::from_slice(&[imgcodecs::IMWRITE_JPEG_QUALITY, 80]),
+        )?;
         Ok(Some(Preview {
             stamp: *stamp,
             rig: rig.clone(),
@@ -216,7 +221,8 @@ impl Reconstructor {
 
     /// Matches in the range where the water should be; where that fails, in the full one.
     fn match_surface(&mut self, pair: &StereoPair, rig: &RectifiedRig) -> Result<Plane, ReconstructError> {
-        let full = DisparityRange { max_px: self.settings.range.max_px.min(rig.width_px.saturating_sub(1)), ..self.settings.range };
+        let full =
+            DisparityRange { max_px: self.settings.range.max_px.min(rig.width_px.saturating_sub(1)), ..self.settings.range };
         // Where less than a quarter of the picture is in common there is little to measure.
         let useful_px = rig.width_px * 3 / 4;
         let world = pair.pose.as_ref().map(|pose| WorldFromRectified::from_pose(pose, &pair.calibration, rig));
@@ -287,7 +293,12 @@ impl Reconstructor {
             // where it stood, so the elevation error is the part of it along the plane's normal.
             let along_normal = plane.normal.dot(&ray);
             let sigma_m = f64::from(m.sigma_px) * depth_m / disparity_px * along_normal;
-            self.points.push(SurfacePoint { north_m: ned_m.x, east_m: ned_m.y, up_m: -ned_m.z as f32, sigma_m: sigma_m as f32 });
+            self.points.push(SurfacePoint {
+                north_m: ned_m.x,
+                east_m: ned_m.y,
+                up_m: -ned_m.z as f32,
+                sigma_m: sigma_m as f32,
+            });
         }
         let pixel_m = depths_m / self.matches.len().max(1) as f64 / rig.focal_px;
         let window_px = self.window_px();
@@ -348,9 +359,13 @@ impl Reconstructor {
             let east_m = grid.south_west_east_m + (i % cols) as f64 * grid.cell_m;
             let Some(seen) = world.on_plane(plane, north_m, east_m) else { continue };
             let (x_px, y_px) = (rig.focal_px * seen.x / seen.z + rig.cx_px, rig.focal_px * seen.y / seen.z + rig.cy_px);
-            let inside = (0.0..f64::from(rig.width_px - 1)).contains(&x_px) && (0.0..f64::from(rig.height_px - 1)).contains(&y_px);
+            let inside =
+                (0.0..f64::from(rig.width_px - 1)).contains(&x_px) && (0.0..f64::from(rig.height_px - 1)).contains(&y_px);
             let disparity_px = rig.focal_px * rig.baseline_m / seen.z;
-            if seen.z > 0.0 && inside && rectifier.is_seen(x_px.round() as u32, y_px.round() as u32, disparity_px as f32, self.window_px() / 2) {
+            if seen.z > 0.0
+                && inside
+                && rectifier.is_seen(x_px.round() as u32, y_px.round() as u32, disparity_px as f32, self.window_px() / 2)
+            {
                 in_view += 1;
                 measured += u32::from(elevation.is_finite());
             }

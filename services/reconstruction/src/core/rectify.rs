@@ -4,7 +4,7 @@
 use halcyon_model::{Image, RigCalibration};
 use nalgebra::{Matrix3, Vector3};
 use opencv::calib3d;
-use opencv::core::{CV_32F, CV_32FC1, CV_8U, Mat, MatTraitConst, MatTraitConstManual, MatTraitManual, Rect, Scalar, Size};
+use opencv::core::{CV_8U, CV_32F, CV_32FC1, Mat, MatTraitConst, MatTraitConstManual, MatTraitManual, Rect, Scalar, Size};
 
 use super::camera;
 use super::cv;
@@ -30,7 +30,9 @@ pub enum RectifyError {
         z_m: f64,
     },
     /// Pictures of another size than the calibration's.
-    #[error("a picture of {width_px}x{height_px} px does not belong to a calibration for {calibrated_width_px}x{calibrated_height_px}")]
+    #[error(
+        "a picture of {width_px}x{height_px} px does not belong to a calibration for {calibrated_width_px}x{calibrated_height_px}"
+    )]
     Size {
         /// The picture's width.
         width_px: u32,
@@ -133,11 +135,13 @@ impl Rectifier {
     /// [`RectifyError`] for numbers out of range, or cameras that are not side by side, left one left.
     pub fn new(calibration: &RigCalibration) -> Result<Self, RectifyError> {
         check(calibration)?;
-        let (left_matrix, left_distortion) = (cv::mat_from_matrix3(&calibration.left.matrix())?, cv::mat_from_distortion(&calibration.left)?);
+        let (left_matrix, left_distortion) =
+            (cv::mat_from_matrix3(&calibration.left.matrix())?, cv::mat_from_distortion(&calibration.left)?);
         let (right_matrix, right_distortion) =
             (cv::mat_from_matrix3(&calibration.right.matrix())?, cv::mat_from_distortion(&calibration.right)?);
         let size = Size::new(calibration.width_px as i32, calibration.height_px as i32);
-        let (mut r1, mut r2, mut p1, mut p2, mut q) = (Mat::default(), Mat::default(), Mat::default(), Mat::default(), Mat::default());
+        let (mut r1, mut r2, mut p1, mut p2, mut q) =
+            (Mat::default(), Mat::default(), Mat::default(), Mat::default(), Mat::default());
         calib3d::stereo_rectify(
             &left_matrix,
             &left_distortion,
@@ -194,7 +198,10 @@ impl Rectifier {
         let margin_px = margin_px as f32;
         let within = |side: &Side, at_px: f32| {
             let (from_px, to_px) = (at_px - margin_px, (at_px + margin_px).min(last_px));
-            from_px >= 0.0 && from_px <= last_px && side.inside[row + from_px.round() as usize] && side.inside[row + to_px.round() as usize]
+            from_px >= 0.0
+                && from_px <= last_px
+                && side.inside[row + from_px.round() as usize]
+                && side.inside[row + to_px.round() as usize]
         };
         within(&self.right, right_px) && within(&self.left, (x_px as f32).max(margin_px))
     }

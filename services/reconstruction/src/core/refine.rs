@@ -158,7 +158,8 @@ impl Refiner {
         let whole = self.whole.data_typed_mut::<f32>()?;
         let warped = self.pictures.warped.data_typed_mut::<f32>()?;
         let mut last = disparity.values_px.iter().copied().find(|value| value.is_finite()).unwrap_or(0.0);
-        let rows = disparity.values_px.chunks_exact(width).zip(whole.chunks_exact_mut(width).zip(warped.chunks_exact_mut(width)));
+        let rows =
+            disparity.values_px.chunks_exact(width).zip(whole.chunks_exact_mut(width).zip(warped.chunks_exact_mut(width)));
         for (y, (values, (whole, warped))) in rows.enumerate() {
             last = values.iter().copied().find(|value| value.is_finite()).unwrap_or(last);
             for (x, (value, (whole, warped))) in values.iter().zip(whole.iter_mut().zip(warped)).enumerate() {

@@ -13,7 +13,7 @@ use halcyon_model::Stamp;
 /// Over this time the variance of the tilt is learnt, seconds: several waves.
 const VARIANCE_MEMORY_S: f64 = 15.0;
 /// Before anything is learnt: an r.m.s. slope of the fitted plane that waves may make …
-const SLOPE_PRIOR: f64 = 0.03;
+const SLOPE_PRIOR: f64 = 0.015;
 /// … believed as much as this time of observing, seconds. Too small a start would take the first waves for misalignment.
 const PRIOR_S: f64 = 1.0;
 /// Slopes of one wave are no independent witnesses: one counts in this time, seconds.

@@ -45,7 +45,9 @@ pub fn glob(pattern: &str) -> Result<Vec<PathBuf>, GlobError> {
             let entries = match std::fs::read_dir(listed) {
                 Ok(entries) => entries,
                 // A file, or nothing, where the pattern wants a folder: no match, not a failure.
-                Err(error) if matches!(error.kind(), std::io::ErrorKind::NotFound | std::io::ErrorKind::NotADirectory) => continue,
+                Err(error) if matches!(error.kind(), std::io::ErrorKind::NotFound | std::io::ErrorKind::NotADirectory) => {
+                    continue;
+                }
                 Err(source) => return Err(GlobError::List { folder, source }),
             };
             for entry in entries {
@@ -120,7 +122,9 @@ mod tests {
 
     #[test]
     fn wildcards() {
-        let check = |pattern: &str, text: &str, expected| assert_eq!(matches(pattern.as_bytes(), text.as_bytes()), expected, "{pattern} {text}");
+        let check = |pattern: &str, text: &str, expected| {
+            assert_eq!(matches(pattern.as_bytes(), text.as_bytes()), expected, "{pattern} {text}")
+        };
         check("left*.jpg", "left01.jpg", true);
         check("left??.jpg", "left01.jpg", true);
         check("left?.jpg", "left01.jpg", false);

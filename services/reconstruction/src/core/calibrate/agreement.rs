@@ -16,7 +16,12 @@ use super::sighting::{Pose, Sighting, ViewProblem};
 const ANGLE_MAX_RAD: f64 = 0.12;
 
 /// Renumbers right-hand corners where that makes views agree, and marks the pairs that never do.
-pub(super) fn settle(sightings: &mut [Sighting], board: &BoardSpec, left: &CameraIntrinsics, right: &CameraIntrinsics) -> Result<()> {
+pub(super) fn settle(
+    sightings: &mut [Sighting],
+    board: &BoardSpec,
+    left: &CameraIntrinsics,
+    right: &CameraIntrinsics,
+) -> Result<()> {
     let turns = board.turns();
     // The relative pose of the cameras for each view and each numbering of its right-hand corners.
     let mut relative: Vec<Vec<Option<Pose>>> = Vec::with_capacity(sightings.len());

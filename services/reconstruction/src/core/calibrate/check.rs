@@ -5,15 +5,15 @@ use opencv::Result;
 use opencv::calib3d;
 use opencv::core::{Mat, Point2f, Rect, Size, Vector};
 
+use super::VIEWS_MIN;
 use super::fit::RigFit;
 use super::sighting::{Residuals, Sighting, ViewProblem};
-use super::VIEWS_MIN;
 use crate::core::cv;
 
 /// A view goes when its error is this many times the median view's …
 const VIEW_ERROR_RATIO_MAX: f64 = 3.0;
 /// … and above this, pixels: with near-perfect pictures ratios mean nothing.
-const VIEW_ERROR_PX_MIN: f64 = 0.3;
+const VIEW_ERROR_PX_MIN: f64 = 0.25;
 /// A corner goes when its residual is this many standard deviations long, where one in four million would by chance.
 const CORNER_SIGMAS_MAX: f64 = 5.5;
 
@@ -52,25 +52,32 @@ pub(super) fn rms_px<'a>(views: impl Iterator<Item = (&'a Sighting, &'a Residual
     (sum / count as f64).sqrt()
 }
 
-/// Marks the views whose error is far above the median; says whether any went. Keeps at least half of the views, and
-/// [`VIEWS_MIN`]: where more look bad, the good ones are not known.
-pub(super) fn reject_views(sightings: &mut [Sighting], residuals: &[Residuals]) -> bool {
+/// Median residual of a view's kept corners, pixels. Robust: a single bad corner does not make a bad view.
+fn median_px(sighting: &Sighting, residuals: &Residuals) -> f64 {
+    let mut lengths: Vec<f64> =
+        sighting.kept_corners().flat_map(|i| [residuals.left[i].norm(), residuals.right[i].norm()]).collect();
+    let middle = lengths.len() / 2;
+    if lengths.is_empty() { f64::NAN } else { *lengths.select_nth_unstable_by(middle, f64::total_cmp).1 }
+}
+
+/// Marks the worst view where its error is far above the median view's; says whether one went. One at a time: a bad view
+/// drags the solution along and makes good ones look bad. Keeps at least half of the views, and [`VIEWS_MIN`]: where more look
+/// bad, the good ones are not known.
+pub(super) fn reject_worst_view(sightings: &mut [Sighting], residuals: &[Residuals]) -> bool {
     let mut errors: Vec<(usize, f64)> = (0..sightings.len())
         .filter(|&view| sightings[view].is_used())
-        .map(|view| (view, rms_px(std::iter::once((&sightings[view], &residuals[view])), Side::Both)))
+        .map(|view| (view, median_px(&sightings[view], &residuals[view])))
         .collect();
     errors.sort_by(|a, b| b.1.total_cmp(&a.1));
     let limit_px = (errors[errors.len() / 2].1 * VIEW_ERROR_RATIO_MAX).max(VIEW_ERROR_PX_MIN);
-    let spare = errors.len() - errors.len().div_ceil(2).max(VIEWS_MIN).min(errors.len());
-    let mut went = false;
-    for (view, error_px) in errors.into_iter().take(spare) {
-        // A NaN error is a view whose pose has no solution: it goes, too.
-        if !(error_px <= limit_px) {
-            sightings[view].problem = Some(ViewProblem::LargeError);
-            went = true;
-        }
+    let kept_min = sightings.len().div_ceil(2).max(VIEWS_MIN);
+    let (worst, error_px) = errors[0];
+    // A NaN error is a view whose pose has no solution: it goes, too.
+    let goes = errors.len() > kept_min && (error_px > limit_px || error_px.is_nan());
+    if goes {
+        sightings[worst].problem = Some(ViewProblem::LargeError);
     }
-    went
+    goes
 }
 
 /// Leaves out corners whose residual, in either picture, is too long for the scatter of all; says whether any went. Where that
@@ -90,10 +97,13 @@ pub(super) fn reject_corners(sightings: &mut [Sighting], residuals: &[Residuals]
     let sigma_px = lengths[lengths.len() / 2].0 / 1.567;
     let spare = ((total as f64 * share_max) as usize).saturating_sub(gone);
     let mut went = false;
+    let mut seen = vec![false; sightings.len()];
     for (length_px, view, i) in lengths.into_iter().take(spare) {
-        // Never so many of one view that its pose hangs on a few corners.
+        // One of a view at a time: it drags the board's pose along and makes its neighbours look bad. And never so many that
+        // the pose hangs on a few corners.
         let kept = sightings[view].kept_corners().count();
-        if length_px > CORNER_SIGMAS_MAX * sigma_px && kept > sightings[view].keep.len() / 2 {
+        let had_its_turn = std::mem::replace(&mut seen[view], true);
+        if length_px > CORNER_SIGMAS_MAX * sigma_px && !had_its_turn && kept > sightings[view].keep.len() / 2 {
             sightings[view].keep[i] = false;
             went = true;
         }
@@ -105,7 +115,8 @@ pub(super) fn reject_corners(sightings: &mut [Sighting], residuals: &[Residuals]
 pub(super) fn row_error(fit: &RigFit, sightings: &[Sighting], (width_px, height_px): (u32, u32)) -> Result<RowError> {
     let (left_matrix, left_distortion) = (cv::mat_from_matrix3(&fit.left.matrix())?, cv::mat_from_distortion(&fit.left)?);
     let (right_matrix, right_distortion) = (cv::mat_from_matrix3(&fit.right.matrix())?, cv::mat_from_distortion(&fit.right)?);
-    let (mut r1, mut r2, mut p1, mut p2, mut q) = (Mat::default(), Mat::default(), Mat::default(), Mat::default(), Mat::default());
+    let (mut r1, mut r2, mut p1, mut p2, mut q) =
+        (Mat::default(), Mat::default(), Mat::default(), Mat::default(), Mat::default());
     let size = Size::new(width_px as i32, height_px as i32);
     calib3d::stereo_rectify(
         &left_matrix,
@@ -155,7 +166,8 @@ pub(super) fn coverage<'a>(
     let mut seen = [[false; COLS]; ROWS];
     for (sighting, corners) in views.filter(|(sighting, _)| sighting.is_used()) {
         for i in sighting.kept_corners() {
-            let at = Vector2::new(f64::from(corners[i].x) / f64::from(width_px), f64::from(corners[i].y) / f64::from(height_px));
+            let at =
+                Vector2::new(f64::from(corners[i].x) / f64::from(width_px), f64::from(corners[i].y) / f64::from(height_px));
             let field = |share: f64, fields: usize| ((share * fields as f64) as usize).min(fields - 1);
             seen[field(at.y, ROWS)][field(at.x, COLS)] = true;
         }

@@ -149,7 +149,8 @@ impl Points {
     /// The rig with the cameras held fixed, then everything together. `None` where this start leads nowhere.
     fn rig(&self, model: DistortionModel, left: &CameraIntrinsics, right: &CameraIntrinsics) -> Result<Option<RigFit>> {
         let (mut left_matrix, mut left_distortion) = (cv::mat_from_matrix3(&left.matrix())?, cv::mat_from_distortion(left)?);
-        let (mut right_matrix, mut right_distortion) = (cv::mat_from_matrix3(&right.matrix())?, cv::mat_from_distortion(right)?);
+        let (mut right_matrix, mut right_distortion) =
+            (cv::mat_from_matrix3(&right.matrix())?, cv::mat_from_distortion(right)?);
         let (mut rotation, mut translation) = (Mat::default(), Mat::default());
         let (mut essential, mut fundamental, mut per_view) = (Mat::default(), Mat::default(), Mat::default());
         let together = calib3d::CALIB_USE_INTRINSIC_GUESS | calib3d::CALIB_USE_EXTRINSIC_GUESS | model.flags();
@@ -232,6 +233,11 @@ impl Points {
             }
         }
         Ok(best.map(|(_, fit)| fit))
+    }
+
+    /// The same model again after a few points have gone, from the solution before.
+    pub(super) fn refine(&self, fit: &RigFit) -> Result<Option<RigFit>> {
+        self.rig(fit.model, &fit.left, &fit.right)
     }
 
     /// Bayesian information criterion, up to what all models share: n ln(mean square) + parameters · ln n.

@@ -5,6 +5,8 @@ mod board;
 mod check;
 mod fit;
 mod sighting;
+#[cfg(test)]
+mod tests;
 
 pub use board::BoardSpec;
 pub use check::RowError;
@@ -19,6 +21,8 @@ use sighting::{Residuals, Sighting};
 pub const VIEWS_MIN: usize = 3;
 /// At most this share of the corners is ever rejected as outliers; more means that something else is wrong.
 const CORNERS_REJECTED_MAX: f64 = 0.03;
+/// Rounds of leaving out corners: after the first few nothing new turns up.
+const CORNER_ROUNDS: u32 = 6;
 
 /// Why there is no calibration.
 #[derive(Debug, thiserror::Error)]
@@ -78,7 +82,9 @@ pub enum CalibrateError {
         seen_rows: u32,
     },
     /// Too few views to fix the cameras.
-    #[error("{usable} of {views} pairs can be used (the board seen whole on both sides, and left agreeing with right); at least {VIEWS_MIN} are needed")]
+    #[error(
+        "{usable} of {views} pairs can be used (the board seen whole on both sides, and left agreeing with right); at least {VIEWS_MIN} are needed"
+    )]
     TooFewViews {
         /// Pairs given.
         views: usize,
@@ -187,8 +193,11 @@ pub fn calibrate_with(
     let used = || sightings.iter().zip(&residuals).filter(|(sighting, _)| sighting.is_used());
     let corners_total = sightings.len() * board.corners();
     let corners_used: usize = used().map(|(sighting, _)| sighting.kept_corners().count()).sum();
-    let errors: Vec<f64> =
-        quality.iter().filter(|view| view.problem.is_none()).map(|view| (view.left_error_px + view.right_error_px) / 2.0).collect();
+    let errors: Vec<f64> = quality
+        .iter()
+        .filter(|view| view.problem.is_none())
+        .map(|view| (view.left_error_px + view.right_error_px) / 2.0)
+        .collect();
     Ok(Calibration {
         rig: rig_from_fit(&fit, size),
         model: fit.model,
@@ -280,24 +289,36 @@ fn solve(sightings: &[Sighting], board: &BoardSpec, size: (u32, u32)) -> Result<
     Ok((fit, residuals))
 }
 
-/// Leaves out views and corners that do not belong, and solves again, until nothing more goes (a few rounds at most).
+/// Leaves out views and corners that do not belong, one view or one round of corners at a time, and solves again in between.
 fn reject_outliers(
     sightings: &mut [Sighting],
     board: &BoardSpec,
     size: (u32, u32),
     first: RigFit,
 ) -> Result<(RigFit, Vec<Residuals>), CalibrateError> {
+    let residuals_of = |sightings: &[Sighting], fit: &RigFit| -> Result<Vec<Residuals>, CalibrateError> {
+        Ok(sightings.iter().map(|sighting| sighting.residuals(fit, board)).collect::<Result<_, _>>()?)
+    };
+    let mut residuals = residuals_of(sightings, &first)?;
     let mut fit = first;
-    let mut residuals = sightings.iter().map(|sighting| sighting.residuals(&fit, board)).collect::<Result<Vec<_>, _>>()?;
-    for _ in 0..4 {
-        let views_went = check::reject_views(sightings, &residuals);
-        let corners_went = !views_went && check::reject_corners(sightings, &residuals, CORNERS_REJECTED_MAX);
-        if !views_went && !corners_went {
-            break;
+    let mut corner_rounds = 0;
+    let mut went = false;
+    // Ends: each round takes out a view, of which half stay, or is one of a few rounds of corners.
+    loop {
+        let view_went = check::reject_worst_view(sightings, &residuals);
+        if !view_went {
+            if corner_rounds == CORNER_ROUNDS || !check::reject_corners(sightings, &residuals, CORNERS_REJECTED_MAX) {
+                break;
+            }
+            corner_rounds += 1;
         }
-        (fit, residuals) = solve(sightings, board, size)?;
+        went = true;
+        let used = sightings.iter().filter(|sighting| sighting.is_used()).count();
+        fit = Points::new(sightings, board, size).refine(&fit)?.ok_or(CalibrateError::Degenerate { views: used })?;
+        residuals = residuals_of(sightings, &fit)?;
     }
-    Ok((fit, residuals))
+    // What went may have been what a richer model was for.
+    if went { solve(sightings, board, size) } else { Ok((fit, residuals)) }
 }
 
 fn mean_error_px(sighting: &Sighting, residuals: &[nalgebra::Vector2<f64>]) -> f64 {

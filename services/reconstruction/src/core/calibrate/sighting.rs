@@ -93,7 +93,10 @@ impl Sighting {
     fn residual_of(&self, corner: usize, fit: &RigFit, board: &BoardSpec, pose: &Pose) -> (Vector2<f64>, Vector2<f64>) {
         let in_left = pose.apply(&board.corner_m(corner));
         let in_right = fit.right_from_left * in_left + fit.right_from_left_m;
-        (seen(self.left[corner]) - camera::project(&fit.left, &in_left), seen(self.right[corner]) - camera::project(&fit.right, &in_right))
+        (
+            seen(self.left[corner]) - camera::project(&fit.left, &in_left),
+            seen(self.right[corner]) - camera::project(&fit.right, &in_right),
+        )
     }
 
     /// One Gauss-Newton step of the board's pose against both pictures, and its length.

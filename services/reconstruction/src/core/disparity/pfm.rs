@@ -58,7 +58,7 @@ pub fn decode(bytes: &[u8]) -> Result<Disparity, PfmError> {
     if scale == 0.0 || !scale.is_finite() {
         return Err(PfmError::Header("the scale is 0 or not finite"));
     }
-    let needed = u64::from(width_px) * u64::from(height_px) * 4;
+    let needed = (u64::from(width_px) * u64::from(height_px)).saturating_mul(4);
     // Exactly one white space ends the header.
     let data = bytes.get(end + 1..).unwrap_or_default();
     if (data.len() as u64) < needed {

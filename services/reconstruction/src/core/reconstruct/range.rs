@@ -6,11 +6,17 @@ use crate::core::rectify::RectifiedRig;
 
 /// The range of disparities at which both cameras see level water at `level_m` ± `margin_m` above the datum; `None` where
 /// part of the picture looks above the horizon, or the camera is not above the water.
-pub(super) fn expected_range(world: &WorldFromRectified, rig: &RectifiedRig, level_m: f64, margin_m: f64) -> Option<DisparityRange> {
+pub(super) fn expected_range(
+    world: &WorldFromRectified,
+    rig: &RectifiedRig,
+    level_m: f64,
+    margin_m: f64,
+) -> Option<DisparityRange> {
     let height_m = -world.origin_ned_m.z - level_m;
     let (right_px, bottom_px) = (f64::from(rig.width_px) - 1.0, f64::from(rig.height_px) - 1.0);
     // Disparity of level water is affine in the pixel: its extremes are in the corners.
-    let downwards = [(0.0, 0.0), (right_px, 0.0), (0.0, bottom_px), (right_px, bottom_px)].map(|(x_px, y_px)| (world.rotation * rig.ray(x_px, y_px)).z);
+    let downwards = [(0.0, 0.0), (right_px, 0.0), (0.0, bottom_px), (right_px, bottom_px)]
+        .map(|(x_px, y_px)| (world.rotation * rig.ray(x_px, y_px)).z);
     let least = downwards.into_iter().fold(f64::INFINITY, f64::min);
     let most = downwards.into_iter().fold(0.0, f64::max);
     // Negated so that NaN is refused, too.
@@ -53,7 +59,10 @@ mod tests {
     fn on_the_ground_or_towards_the_horizon_nothing_is_known() {
         let ground = WorldFromRectified { rotation: Matrix3::identity(), origin_ned_m: Vector3::zeros() };
         assert_eq!(expected_range(&ground, &RIG, 0.0, 0.5), None);
-        let forward = WorldFromRectified { rotation: Matrix3::new(0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0), origin_ned_m: Vector3::new(0.0, 0.0, -5.0) };
+        let forward = WorldFromRectified {
+            rotation: Matrix3::new(0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0),
+            origin_ned_m: Vector3::new(0.0, 0.0, -5.0),
+        };
         assert_eq!(expected_range(&forward, &RIG, 0.0, 0.5), None);
     }
 }

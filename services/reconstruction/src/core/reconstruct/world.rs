@@ -77,7 +77,8 @@ mod tests {
     };
 
     fn calibration(camera_in_body_m: Vector3<f64>) -> RigCalibration {
-        let camera = halcyon_model::CameraIntrinsics { fx_px: 343.0, fy_px: 343.0, cx_px: 159.5, cy_px: 119.5, distortion: [0.0; 5] };
+        let camera =
+            halcyon_model::CameraIntrinsics { fx_px: 343.0, fy_px: 343.0, cx_px: 159.5, cy_px: 119.5, distortion: [0.0; 5] };
         RigCalibration {
             width_px: 320,
             height_px: 240,
