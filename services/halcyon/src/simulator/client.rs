@@ -53,12 +53,8 @@ impl Client {
         let (outbound, outbound_receiver) = mpsc::channel(OUTBOUND_MAX);
         let close = CancellationToken::new();
         let spoken = Arc::new(AtomicU8::new(0));
-        let ends = Ends {
-            inbound: inbound_sender,
-            outbound: outbound_receiver,
-            close: close.clone(),
-            spoken: Arc::clone(&spoken),
-        };
+        let ends =
+            Ends { inbound: inbound_sender, outbound: outbound_receiver, close: close.clone(), spoken: Arc::clone(&spoken) };
         let batch = Vec::with_capacity(batch_max + 512);
         let _close = close.drop_guard();
         (Self { link, inbound, outbound, spoken, sequence: 0, batch, batch_max, lossy, _close }, ends)

@@ -11,6 +11,8 @@
 
 mod client;
 mod server;
+#[cfg(test)]
+mod tests;
 
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -92,8 +94,7 @@ pub async fn run_with(context: Context, listeners: Listeners, config: SimConfig)
     let mut tasks = JoinSet::new();
     for (index, (id, listener, address)) in listeners.vehicles.iter().enumerate() {
         tracing::info!(vehicle = %id, %address, "simulated vehicle speaks MAVLink");
-        let server =
-            server::Server::new(context.clone(), &config, index, Arc::clone(listener), Arc::clone(&water)).await?;
+        let server = server::Server::new(context.clone(), &config, index, Arc::clone(listener), Arc::clone(&water)).await?;
         tasks.spawn(server.run());
     }
     context.health.ready(format!("{} simulated vehicles", listeners.vehicles.len()));

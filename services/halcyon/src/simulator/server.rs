@@ -47,8 +47,7 @@ impl Server {
         let now = context.clock.now();
         let vehicle = Vehicle::new(config, index, context.origin, now).context("no such simulated vehicle")?;
         let truths = context.bus.publisher(&topics::sim_truth(vehicle.id())).await?;
-        let mut server =
-            Self { context, vehicle, listener, water, truths, truth_due: now, clients: Vec::new(), next_link: 0 };
+        let mut server = Self { context, vehicle, listener, water, truths, truth_due: now, clients: Vec::new(), next_link: 0 };
         if let Some(address) = config.vehicles.get(index).and_then(|vehicle| vehicle.udp_out) {
             server.speak_to(address).await?;
         }
@@ -124,8 +123,7 @@ impl Server {
         while target.as_nanos() - self.vehicle.now().as_nanos() >= STEP_NS {
             let until = target.min(self.truth_due.max(self.vehicle.now() + Duration::from_nanos(STEP_NS as u64)));
             let water = &self.water;
-            let elevation =
-                |place: LocalPoint, stamp: Stamp| water.elevation_m(place.north_m, place.east_m, stamp);
+            let elevation = |place: LocalPoint, stamp: Stamp| water.elevation_m(place.north_m, place.east_m, stamp);
             self.vehicle.advance(until, &elevation);
             if self.vehicle.now() + Duration::from_nanos(STEP_NS as u64) > self.truth_due {
                 self.truth_due = self.truth_due.plus_secs_f64(TRUTH_EVERY_S).max(self.vehicle.now());
