@@ -35,7 +35,7 @@ async fn start(overrides: &[String]) -> Rig {
 
 impl Rig {
     /// Waits for a health report whose detail holds `part`.
-    #[allow(clippy::unwrap_used, reason = "a helper of tests")]
+    #[allow(clippy::unwrap_used, clippy::panic, reason = "a helper of tests")]
     async fn health(&mut self, part: &str) -> Health {
         let wanted = async {
             loop {

@@ -18,7 +18,8 @@ fn rig() -> RigCalibration {
 #[test]
 fn opencv_reads_what_we_write() {
     let rig = rig();
-    let file = FileStorage::new(&rig_yaml::write(&rig), FileStorage_READ | FileStorage_MEMORY, "").unwrap();
+    let text = rig_yaml::write(&rig);
+    let file = FileStorage::new(text.as_str(), FileStorage_READ | FileStorage_MEMORY, "").unwrap();
     let matrix = |key: &str| {
         let mat = file.get(key).unwrap().mat().unwrap();
         DMatrix::from_row_slice(mat.rows() as usize, mat.cols() as usize, mat.data_typed::<f64>().unwrap())

@@ -15,6 +15,7 @@ fn small() -> SimConfig {
     sim
 }
 
+#[allow(clippy::unwrap_used, reason = "a helper of tests")]
 fn render(folder: &Path, frames: usize) {
     let options =
         RenderOptions { frames, rate_hz: 4.0, sway_deg: 3.0, sway_m: 0.2, heading_deg: 40.0, ..RenderOptions::default() };
@@ -72,6 +73,7 @@ fn options_out_of_range_are_refused() {
 
 /// Breaks a good folder one way and returns the one line that says so, without the folder's own path.
 #[track_caller]
+#[allow(clippy::expect_used, reason = "a helper of tests")]
 fn broken(how: impl FnOnce(&Path)) -> String {
     let folder = tempfile::tempdir().unwrap();
     render(folder.path(), 3);
