@@ -1,4 +1,5 @@
 //! The whole gateway on a real, private bus.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test")]
 
 mod support;
 

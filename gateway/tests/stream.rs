@@ -1,4 +1,5 @@
 //! The live stream.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test")]
 
 mod support;
 

@@ -67,6 +67,7 @@ pub async fn observe(request: Request, next: Next) -> Response {
     response
 }
 
+#[allow(clippy::needless_pass_by_value, reason = "catch-panic's signature")]
 /// A handler panicked: log why, tell the client nothing of it.
 pub fn panicked(cause: Box<dyn Any + Send + 'static>) -> Response {
     let cause = cause
