@@ -67,8 +67,8 @@ pub async fn observe(request: Request, next: Next) -> Response {
     response
 }
 
-#[allow(clippy::needless_pass_by_value, reason = "catch-panic's signature")]
 /// A handler panicked: log why, tell the client nothing of it.
+#[allow(clippy::needless_pass_by_value, reason = "catch-panic's signature")]
 pub fn panicked(cause: Box<dyn Any + Send + 'static>) -> Response {
     let cause = cause
         .downcast_ref::<String>()
