@@ -73,7 +73,7 @@ fn options_out_of_range_are_refused() {
 
 /// Breaks a good folder one way and returns the one line that says so, without the folder's own path.
 #[track_caller]
-#[allow(clippy::expect_used, reason = "a helper of tests")]
+#[allow(clippy::unwrap_used, clippy::expect_used, reason = "a helper of tests")]
 fn broken(how: impl FnOnce(&Path)) -> String {
     let folder = tempfile::tempdir().unwrap();
     render(folder.path(), 3);
