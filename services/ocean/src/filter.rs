@@ -6,21 +6,16 @@ use crate::record::{Record, remove_line};
 
 /// The part of `record` between `low_hz` and `high_hz`, metres, without shift in time.
 ///
-/// The trend is taken off, the record is continued by its point reflection at both ends (so that a drift does not jump there),
-/// and its Fourier components are kept between the two frequencies, halved at each (raised-cosine edges a tenth of the frequency wide
-/// to either side). `low_hz` of 0 keeps all that is slow, `high_hz` of infinity all that is fast.
+/// The trend is taken off, the record is continued by its mirror image at both ends (which shifts no mean level, as a point
+/// reflection at a crest would, and lets no drift jump), and its Fourier components are kept between the two frequencies,
+/// halved at each (raised-cosine edges a tenth of the frequency wide to either side). `low_hz` of 0 keeps all that is slow, `high_hz` of
+/// infinity all that is fast.
 #[must_use]
 pub fn band_pass(record: &Record, low_hz: f64, high_hz: f64) -> Vec<f64> {
     let n = record.samples_m().len();
     let mut middle = record.samples_m().to_vec();
     remove_line(&mut middle);
-    let (first, last) = (middle[0], middle[n - 1]);
-    let before = middle[1..].iter().rev().map(|x| 2.0 * first - x);
-    let after = middle[..n - 1].iter().rev().map(|x| 2.0 * last - x);
-    let mut extended: Vec<f64> = before.chain(middle.iter().copied()).chain(after).collect();
-    // The reflections shift the two outer ends apart; a line closes the circle that the transform sees.
-    remove_line(&mut extended);
-
+    let mut extended: Vec<f64> = middle.iter().chain(middle.iter().rev()).copied().collect();
     let length = extended.len();
     let mut planner = RealFftPlanner::<f64>::new();
     let (forward, inverse) = (planner.plan_fft_forward(length), planner.plan_fft_inverse(length));
@@ -37,7 +32,8 @@ pub fn band_pass(record: &Record, low_hz: f64, high_hz: f64) -> Vec<f64> {
     if inverse.process(&mut bins, &mut extended).is_err() {
         return middle;
     }
-    extended[n - 1..2 * n - 1].to_vec()
+    extended.truncate(n);
+    extended
 }
 
 /// 0 well under `edge_hz`, 1 well above, a raised cosine between.

@@ -1,4 +1,5 @@
 //! The service on a private bus.
+#![allow(clippy::unwrap_used, reason = "a test may fail")]
 
 mod support;
 

@@ -1,4 +1,5 @@
 //! The reported intervals hold the truth as often as they say, over many random seas.
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may fail, and shows its figures")]
 
 mod support;
 

@@ -106,7 +106,7 @@ impl Assessor {
         let measured = interval_s.map(|interval_s| {
             let hidden = hidden(&self.window, &self.config, interval_s);
             let series = Series::new(&self.window, &hidden, self.config.gap_s_max.max(2.0 * interval_s));
-            let statistics = Statistics::of(&self.window, &series, interval_s);
+            let statistics = Statistics::of(&self.window, &series, &hidden, interval_s);
             (hidden, series, statistics)
         });
         let (hidden, series, statistics) = measured.map_or((None, None, None), |(h, s, t)| (Some(h), Some(s), t));

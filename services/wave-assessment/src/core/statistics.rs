@@ -11,6 +11,7 @@ use halcyon_ocean::height::{H_MEAN_OVER_ROOT_M0, H_S_OVER_ROOT_M0, expected_high
 use halcyon_ocean::{Record, Spline};
 
 use super::gauge::GAUGES;
+use super::hidden::Hidden;
 use super::sampling::degrees_of_freedom;
 use super::series::Series;
 use super::window::Window;
@@ -19,6 +20,8 @@ use super::window::Window;
 const DENSER: f64 = 4.0;
 /// Heights of single waves scatter a little more than the variance does: their intervals have this share of its freedom.
 const HEIGHT_FREEDOM: f64 = 0.9;
+/// Near the ends of the window a filter cannot know how waves go on: single ones of the hidden part are wrong by about this share.
+const SPLIT_ERROR: f64 = 0.05;
 /// Two-sided 95 % of the normal distribution.
 const NORMAL_95: f64 = 1.96;
 
@@ -41,12 +44,12 @@ pub(crate) struct Statistics {
 
 impl Statistics {
     /// Of a window; `None` where no gauge has a series.
-    pub(crate) fn of(window: &Window, series: &Series, interval_s: f64) -> Option<Self> {
+    pub(crate) fn of(window: &Window, series: &Series, hidden: &Hidden, interval_s: f64) -> Option<Self> {
         if series.samples == 0 {
             return None;
         }
         let mean_square = |pick: fn(&super::series::Stretch) -> &[f64]| {
-            series.stretches.iter().flat_map(|s| pick(s)).map(|x| x * x).sum::<f64>() / series.samples as f64
+            series.stretches.iter().flat_map(pick).map(|x| x * x).sum::<f64>() / series.samples as f64
         };
         let variance_m2 = mean_square(|s| &s.elevation_m);
         // Adding what may be hidden waves can lower the variance by chance; that is no reason to hope.
@@ -63,7 +66,8 @@ impl Statistics {
         let freedom = degrees_of_freedom(series, interval_s, period_s).unwrap_or(1.0).max(1.0);
         let above_noise = variance_m2 * variance_factors_95(freedom).0 > 2.0 * noise_m2;
 
-        let scale = Scale { variance_m2, upper_m2, noise_m2 };
+        let hidden_m = if let Hidden::Measured { h_m0_m, .. } = hidden { *h_m0_m } else { 0.0 };
+        let scale = Scale { variance_m2, upper_m2, noise_m2, hidden_m };
         let height = |pick: fn(&WaveStatistics) -> f64, ratio: f64| {
             let heights_m: Vec<f64> = counts.iter().map(pick).collect();
             let heights_m = if heights_m.is_empty() { vec![ratio * variance_m2.sqrt()] } else { heights_m };
@@ -110,11 +114,13 @@ impl Statistics {
     }
 }
 
-/// Variances behind the heights, m²: as estimated, with all that may be waves, and the readings' own noise.
+/// Variances behind the heights, m²: as estimated, with all that may be waves, and the readings' own noise; and the height, metres,
+/// of the hidden part in them.
 struct Scale {
     variance_m2: f64,
     upper_m2: f64,
     noise_m2: f64,
+    hidden_m: f64,
 }
 
 impl Scale {
@@ -137,14 +143,15 @@ impl Scale {
     /// highest is likely the one with the luckiest errors, √(2 ln n) deviations up in n draws, so it may be that much lower.
     fn observed(&self, height_m: f64, waves: usize) -> Estimate {
         let sigma_m = (2.0 * self.noise_m2).sqrt();
+        let split_m = SPLIT_ERROR * self.hidden_m;
         let luck = (2.0 * (waves.max(1) as f64).ln()).sqrt();
         let ratio =
             |variance_m2: f64| if self.variance_m2 > 0.0 { (variance_m2.max(0.0) / self.variance_m2).sqrt() } else { 0.0 };
         let value = height_m * ratio(self.variance_m2 - self.noise_m2);
         Estimate {
             value,
-            low: (value - luck.max(NORMAL_95) * sigma_m).max(0.0),
-            high: height_m * ratio(self.upper_m2).max(1.0) + NORMAL_95 * sigma_m,
+            low: (value - luck.max(NORMAL_95) * sigma_m - split_m).max(0.0),
+            high: height_m * ratio(self.upper_m2).max(1.0) + NORMAL_95 * sigma_m + split_m,
         }
     }
 }
