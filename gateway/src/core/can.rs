@@ -37,7 +37,9 @@ pub fn approve(mission: &Mission) -> Result<(), String> {
 pub fn dispatch(mission: &Mission) -> Result<(), String> {
     still_open(mission)?;
     match mission.phase {
-        Phase::AwaitingApproval | Phase::Approved => Ok(()),
+        Phase::AwaitingApproval => Ok(()),
+        Phase::Approved if mission.spec.dispatch_on_approval => Err("It goes as soon as a follower is ready".into()),
+        Phase::Approved => Ok(()),
         Phase::Waiting | Phase::Transit => Err("The water is not measured yet".into()),
         Phase::Assessing => Err("There is no safe verdict yet".into()),
         Phase::Paused => Err("The mission is paused".into()),
@@ -69,4 +71,58 @@ pub fn resume(mission: &Mission) -> Result<(), String> {
 /// Why not, for people.
 pub fn abort(mission: &Mission) -> Result<(), String> {
     still_open(mission)
+}
+
+#[cfg(test)]
+mod tests {
+    use halcyon_model::{Approval, LocalPoint, MissionId, MissionSpec, Stamp};
+
+    use super::*;
+
+    /// Which of approve, dispatch, pause, resume and abort can be done in `phase`, by their first letters.
+    #[track_caller]
+    fn check(phase: Phase, dispatch_on_approval: bool, expected: &str) {
+        let spec = MissionSpec {
+            name: "m".into(),
+            point: LocalPoint::new(0.0, 0.0),
+            survey_height_m: 5.0,
+            approval: Approval::Manual,
+            dispatch_on_approval,
+            leader: None,
+            follower: None,
+        };
+        let mission = Mission {
+            stamp: Stamp::default(),
+            id: MissionId::new("m").unwrap(),
+            spec,
+            phase,
+            leader: None,
+            follower: None,
+            verdict: None,
+            h_s_m: None,
+            touchdown: None,
+            history: Vec::new(),
+        };
+        let rules: [(char, fn(&Mission) -> Result<(), String>); 5] =
+            [('a', approve), ('d', dispatch), ('p', pause), ('r', resume), ('x', abort)];
+        let able: String = rules.iter().filter(|(_, rule)| rule(&mission).is_ok()).map(|(letter, _)| letter).collect();
+        assert_eq!(able, expected, "{phase:?}");
+        assert!(rules.iter().filter_map(|(_, rule)| rule(&mission).err()).all(|why| !why.is_empty()));
+    }
+
+    #[test]
+    fn the_rules_of_every_phase() {
+        for phase in Phase::ALL {
+            match phase {
+                Phase::AwaitingApproval => check(phase, true, "adpx"),
+                Phase::Approved => {
+                    check(phase, true, "px");
+                    check(phase, false, "dpx");
+                }
+                Phase::Paused => check(phase, true, "rx"),
+                Phase::Completed | Phase::Aborted | Phase::Failed => check(phase, true, ""),
+                _ => check(phase, true, "px"),
+            }
+        }
+    }
 }
