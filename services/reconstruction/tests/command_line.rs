@@ -32,7 +32,7 @@ fn calibrate_writes_a_rig_that_reads_back() {
     let out = folder.path().join("rig.yaml");
     let mut steps = Vec::new();
     let report = cli::calibrate(&sample_glob("left"), &sample_glob("right"), "9x6", 0.025, Some(&out), &mut |done, total| {
-        steps.push((done, total))
+        steps.push((done, total));
     })
     .unwrap();
     assert_eq!(steps, (1..=13).map(|done| (done, 13)).collect::<Vec<_>>());
@@ -85,7 +85,7 @@ fn bad_input_to_calibrate_is_named() {
     let seen = |seen_cols, seen_rows| (seen_cols, seen_rows) == (9, 6) || (seen_cols, seen_rows) == (6, 9);
     match other_board {
         Err(CalibrateCliError::Calibrate(CalibrateError::WrongBoard { cols: 8, rows: 5, seen_cols, seen_rows })) => {
-            assert!(seen(seen_cols, seen_rows))
+            assert!(seen(seen_cols, seen_rows));
         }
         other => panic!("{other:?}"),
     }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use halcyon_model::{CameraIntrinsics, Image};
 use serde::Serialize;
 
-use crate::core::calibrate::{BoardSpec, CalibrateError, Calibration, ViewQuality, calibrate_with};
+use crate::core::calibrate::{BoardSpec, CalibrateError, Calibration, ViewProblem, ViewQuality, calibrate_with};
 use crate::files::{FileError, GlobError, glob, read_picture, write_bytes};
 
 /// Why there is no calibration.
@@ -85,7 +85,7 @@ impl ViewReport {
             left: left.into(),
             right: right.into(),
             used: quality.problem.is_none(),
-            problem: quality.problem.map(|problem| problem.name()),
+            problem: quality.problem.map(ViewProblem::name),
             left_error_px: known(quality.left_error_px),
             right_error_px: known(quality.right_error_px),
             rms_px: known(quality.rms_px),

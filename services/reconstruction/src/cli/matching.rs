@@ -63,7 +63,7 @@ pub fn match_pair(
     out: &Path,
 ) -> Result<MatchReport, MatchCliError> {
     let engine: Engine = engine.parse()?;
-    let extension = out.extension().map(|extension| extension.to_ascii_lowercase());
+    let extension = out.extension().map(std::ffi::OsStr::to_ascii_lowercase);
     let as_png = match extension.as_deref().and_then(std::ffi::OsStr::to_str) {
         Some("pfm") => false,
         Some("png") => true,

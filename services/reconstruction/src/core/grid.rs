@@ -76,8 +76,8 @@ impl Gridder {
         }
         let (first_row, first_col) = ((south / cell_m).floor(), (west / cell_m).floor());
         let (rows, cols) = ((north / cell_m).floor() - first_row + 1.0, (east / cell_m).floor() - first_col + 1.0);
-        // Negated so that NaN is refused, too.
-        if !(rows * cols <= CELLS_MAX as f64) {
+        // NaN is in no range, so that it is refused, too.
+        if !(1.0..=CELLS_MAX as f64).contains(&(rows * cols)) {
             return Err(GridError::TooLarge { north_m: north - south, east_m: east - west, cell_m });
         }
         let (rows, cols) = (rows as usize, cols as usize);

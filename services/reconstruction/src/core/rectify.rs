@@ -250,8 +250,8 @@ fn check(calibration: &RigCalibration) -> Result<(), RectifyError> {
     }
     let rotation = &calibration.right_from_left;
     let off = (rotation * rotation.transpose() - Matrix3::identity()).norm();
-    // Negated so that NaN is refused, too.
-    if !(off < 1e-3) || rotation.determinant() < 0.0 {
+    // NaN is in no range, so that it is refused, too.
+    if !(0.0..1e-3).contains(&off) || rotation.determinant() < 0.0 {
         return Err(RectifyError::Invalid("rotation between the cameras"));
     }
     if !(calibration.baseline_m() > 0.0 && calibration.baseline_m().is_finite()) {

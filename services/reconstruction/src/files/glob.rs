@@ -123,7 +123,7 @@ mod tests {
     #[test]
     fn wildcards() {
         let check = |pattern: &str, text: &str, expected| {
-            assert_eq!(matches(pattern.as_bytes(), text.as_bytes()), expected, "{pattern} {text}")
+            assert_eq!(matches(pattern.as_bytes(), text.as_bytes()), expected, "{pattern} {text}");
         };
         check("left*.jpg", "left01.jpg", true);
         check("left??.jpg", "left01.jpg", true);
