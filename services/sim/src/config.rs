@@ -180,11 +180,7 @@ impl SimConfig {
 
 /// Refuses what is not in `least..=most`, NaN included, in one line.
 pub(crate) fn range(key: &str, value: f64, least: f64, most: f64) -> Result<(), String> {
-    if (least..=most).contains(&value) {
-        Ok(())
-    } else {
-        Err(format!("[sim] {key} must be {least} to {most}, not {value}"))
-    }
+    if (least..=most).contains(&value) { Ok(()) } else { Err(format!("[sim] {key} must be {least} to {most}, not {value}")) }
 }
 
 /// A vehicle's name as text: the model's nouns know no serde.

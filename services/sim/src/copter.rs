@@ -228,7 +228,7 @@ impl Copter {
         };
         self.motion.rate_body_radps += (wanted_radps - self.motion.rate_body_radps) * (1.0 - (-dt_s / lag_s).exp());
         let turned = UnitQuaternion::from_scaled_axis(self.motion.rate_body_radps * dt_s);
-        self.motion.ned_from_body = self.motion.ned_from_body * turned;
+        self.motion.ned_from_body *= turned;
         self.motion.ned_from_body.renormalize_fast();
     }
 

@@ -131,7 +131,8 @@ impl Gnss {
             return None;
         }
         self.since_fix_s -= period_s;
-        let sigma_m = Vector3::new(self.config.horizontal_sigma_m, self.config.horizontal_sigma_m, self.config.vertical_sigma_m);
+        let sigma_m =
+            Vector3::new(self.config.horizontal_sigma_m, self.config.horizontal_sigma_m, self.config.vertical_sigma_m);
         let position_error_ned_m = self.wander.step(period_s, &mut self.random).component_mul(&sigma_m)
             + normal3(&mut self.random) * self.config.white_sigma_m;
         let velocity_error_ned_mps = normal3(&mut self.random) * self.config.velocity_sigma_mps;

@@ -68,9 +68,8 @@ mod tests {
         let mut random = generator(3, "test", "noise");
         let mut process = GaussMarkov::new(2.0, &mut random);
         let samples: Vec<f64> = (0..400_000).map(|_| process.step(0.1, &mut random).x).collect();
-        let mean_of = |lag: usize| {
-            samples.iter().zip(&samples[lag..]).map(|(a, b)| a * b).sum::<f64>() / (samples.len() - lag) as f64
-        };
+        let mean_of =
+            |lag: usize| samples.iter().zip(&samples[lag..]).map(|(a, b)| a * b).sum::<f64>() / (samples.len() - lag) as f64;
         // 40 000 s hold 10 000 independent pairs of correlation times: 1 % standard error, so 4 % is four of them.
         for lag in [0, 10, 20, 40] {
             let expected = (-(lag as f64) * 0.1 / 2.0).exp();

@@ -151,8 +151,7 @@ impl Vehicle {
         let air_mps = (motion.velocity_ned_mps - self.wind_ned_mps).norm();
         self.wind_ned_mps = self.wind.step(STEP_S, -motion.position_ned_m.z, air_mps);
         let support = self.support(elevation);
-        let actuation =
-            if self.motors_stopped || self.battery.is_empty() { Actuation::OFF } else { self.actuation };
+        let actuation = if self.motors_stopped || self.battery.is_empty() { Actuation::OFF } else { self.actuation };
         self.copter.step(STEP_S, &actuation, self.wind_ned_mps, support);
         self.battery.step(STEP_S, self.copter.power_w());
         let estimate = self.estimator.step(STEP_S, self.copter.motion());

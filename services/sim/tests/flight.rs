@@ -1,5 +1,6 @@
 //! Whole flights of a simulated vehicle, by MAVLink messages only, judged by the truth.
 #![allow(deprecated, reason = "ArduPilot still speaks much that MAVLink has deprecated")]
+#![allow(clippy::expect_used, reason = "a test without its vehicle cannot go on")]
 
 use halcyon_model::{FleetOrigin, Geodetic, LocalPoint, Stamp};
 use halcyon_sim::autopilot::{Inbound, LinkId, Mode, Outbound};
@@ -182,7 +183,10 @@ fn nothing_but_heartbeats_and_texts_comes_unasked() {
     let unasked = field.heard.iter().filter(|message| {
         !matches!(
             message,
-            MavMessage::HEARTBEAT(_) | MavMessage::STATUSTEXT(_) | MavMessage::HOME_POSITION(_) | MavMessage::GPS_GLOBAL_ORIGIN(_)
+            MavMessage::HEARTBEAT(_)
+                | MavMessage::STATUSTEXT(_)
+                | MavMessage::HOME_POSITION(_)
+                | MavMessage::GPS_GLOBAL_ORIGIN(_)
         )
     });
     assert_eq!(unasked.count(), 0);

@@ -66,7 +66,6 @@ impl Client {
     }
 
     /// The next message that `pick` wants, within 20 s.
-    #[track_caller]
     async fn hear<T>(&mut self, pick: impl Fn(&MavMessage) -> Option<T>) -> T {
         let listening = async {
             loop {

@@ -245,8 +245,7 @@ impl Controller {
         self.position_m = desired_m.push(self.position_m.z);
         let wanted_mps = self.velocity_mps.xy() + behind_m * params.get(Param::PositionGain);
         let error_mps = wanted_mps - estimate.velocity_ned_mps.xy();
-        let demand_mps2 =
-            self.acceleration_mps2.xy() + error_mps * params.get(Param::VelocityGain) + self.integral_mps2.xy();
+        let demand_mps2 = self.acceleration_mps2.xy() + error_mps * params.get(Param::VelocityGain) + self.integral_mps2.xy();
         // No winding up against the lean limit.
         if demand_mps2.norm() < accel_max_mps2 || error_mps.dot(&self.integral_mps2.xy()) < 0.0 {
             let integral = self.integral_mps2.xy() + error_mps * (params.get(Param::VelocityIntegral) * dt_s);

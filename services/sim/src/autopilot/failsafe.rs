@@ -107,10 +107,7 @@ impl Autopilot {
             }
             self.failsafe.battery_stage = stage;
             let (volts, used_mah) = (self.sensed.battery_v, self.sensed.battery_ah.1 * 1e3);
-            self.text(
-                MavSeverity::MAV_SEVERITY_WARNING,
-                &format!("Battery 1 is {name} {volts:.2}V used {used_mah:.0} mAh"),
-            );
+            self.text(MavSeverity::MAV_SEVERITY_WARNING, &format!("Battery 1 is {name} {volts:.2}V used {used_mah:.0} mAh"));
             let mode = match self.params.get(action) as u32 {
                 0 => continue,
                 2 | 3 => Mode::Rtl,

@@ -280,7 +280,11 @@ impl Autopilot {
             Horizontal::Lean { roll_rad: roll * lean_rad, pitch_rad: pitch * lean_rad }
         };
         let vertical = if self.mode == Mode::Stabilize {
-            Vertical::Thrust(if throttle > 0.0 { 1.0 + throttle * (self.airframe.thrust_to_weight - 1.0) } else { 1.0 + throttle })
+            Vertical::Thrust(if throttle > 0.0 {
+                1.0 + throttle * (self.airframe.thrust_to_weight - 1.0)
+            } else {
+                1.0 + throttle
+            })
         } else {
             Vertical::Rate(if throttle > 0.0 { -throttle * up_mps } else { -throttle * down_mps })
         };

@@ -37,9 +37,7 @@ impl Autopilot {
         let lapsed = |at: Stamp| self.now.seconds_since(at) > self.params.get(Param::GuidedTimeout);
         let (horizontal, vertical) = match &mut self.guided {
             Guided::Hold => (Horizontal::HOLD, Vertical::Rate(0.0)),
-            Guided::TakeOff { down_m } => {
-                (Horizontal::HOLD, Vertical::Position { down_m: *down_m, velocity_mps: 0.0 })
-            }
+            Guided::TakeOff { down_m } => (Horizontal::HOLD, Vertical::Position { down_m: *down_m, velocity_mps: 0.0 }),
             Guided::Position { ned_m } => {
                 (Horizontal::to(ned_m.xy()), Vertical::Position { down_m: ned_m.z, velocity_mps: 0.0 })
             }
@@ -49,10 +47,8 @@ impl Autopilot {
                     self.flight.stop_turning();
                     (Horizontal::HOLD, Vertical::Rate(0.0))
                 } else {
-                    let horizontal = Horizontal::Velocity {
-                        velocity_mps: velocity_mps.xy(),
-                        acceleration_mps2: acceleration_mps2.xy(),
-                    };
+                    let horizontal =
+                        Horizontal::Velocity { velocity_mps: velocity_mps.xy(), acceleration_mps2: acceleration_mps2.xy() };
                     (horizontal, Vertical::Rate(velocity_mps.z))
                 }
             }
@@ -151,9 +147,7 @@ impl Autopilot {
         let flat_m = self.frame.ned_from_geodetic(place);
         let down_m = match frame {
             Frame::MAV_FRAME_GLOBAL | Frame::MAV_FRAME_GLOBAL_INT => self.frame.origin().altitude_m - altitude_m,
-            Frame::MAV_FRAME_GLOBAL_RELATIVE_ALT | Frame::MAV_FRAME_GLOBAL_RELATIVE_ALT_INT => {
-                self.home_ned_m?.z - altitude_m
-            }
+            Frame::MAV_FRAME_GLOBAL_RELATIVE_ALT | Frame::MAV_FRAME_GLOBAL_RELATIVE_ALT_INT => self.home_ned_m?.z - altitude_m,
             _ => return None,
         };
         Some(Vector3::new(flat_m.x, flat_m.y, down_m))

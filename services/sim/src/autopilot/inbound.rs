@@ -70,8 +70,7 @@ impl Autopilot {
             MavMessage::RC_CHANNELS_OVERRIDE(data) if from_pilot => self.take_override(data),
             MavMessage::TIMESYNC(data) if data.tc1 == 0 => {
                 let tc1 = (self.now.seconds_since(self.boot) * 1e9) as i64;
-                let answer =
-                    mav::TIMESYNC_DATA { tc1, ts1: data.ts1, target_system: from.0, target_component: from.1 };
+                let answer = mav::TIMESYNC_DATA { tc1, ts1: data.ts1, target_system: from.0, target_component: from.1 };
                 self.reply(link, MavMessage::TIMESYNC(answer));
             }
             MavMessage::PING(data) if data.target_system == 0 => {

@@ -59,10 +59,7 @@ impl Item {
 
     /// Whether its altitude counts from home.
     pub(crate) fn is_relative(&self) -> bool {
-        matches!(
-            self.frame,
-            mav::MavFrame::MAV_FRAME_GLOBAL_RELATIVE_ALT | mav::MavFrame::MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
-        )
+        matches!(self.frame, mav::MavFrame::MAV_FRAME_GLOBAL_RELATIVE_ALT | mav::MavFrame::MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
     }
 }
 

@@ -115,7 +115,14 @@ pub struct Autopilot {
 impl Autopilot {
     /// Powered up at `now`, in the fleet's local `frame`.
     #[must_use]
-    pub fn new(system_id: u8, frame: LocalFrame, airframe: AirframeConfig, battery_capacity_ah: f64, sensed: Sensed, now: Stamp) -> Self {
+    pub fn new(
+        system_id: u8,
+        frame: LocalFrame,
+        airframe: AirframeConfig,
+        battery_capacity_ah: f64,
+        sensed: Sensed,
+        now: Stamp,
+    ) -> Self {
         let mut params = Params::new();
         params.assign(Param::SystemId, f64::from(system_id));
         params.assign(Param::BatteryCapacity, battery_capacity_ah * 1e3);

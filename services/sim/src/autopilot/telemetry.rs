@@ -53,10 +53,9 @@ impl Autopilot {
         Some(match message_id {
             mav::HEARTBEAT_DATA::ID => self.heartbeat(),
             mav::SYS_STATUS_DATA::ID => self.sys_status(),
-            mav::SYSTEM_TIME_DATA::ID => MavMessage::SYSTEM_TIME(mav::SYSTEM_TIME_DATA {
-                time_unix_usec: self.unix_us(),
-                time_boot_ms: self.boot_ms(),
-            }),
+            mav::SYSTEM_TIME_DATA::ID => {
+                MavMessage::SYSTEM_TIME(mav::SYSTEM_TIME_DATA { time_unix_usec: self.unix_us(), time_boot_ms: self.boot_ms() })
+            }
             mav::GPS_RAW_INT_DATA::ID => self.gps_raw(),
             mav::RAW_IMU_DATA::ID => self.raw_imu(),
             mav::SCALED_PRESSURE_DATA::ID => self.pressure(),

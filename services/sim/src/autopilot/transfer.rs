@@ -103,13 +103,8 @@ impl Autopilot {
     }
 
     fn acknowledge(&mut self, link: LinkId, to: (u8, u8), result: Answer, mission_type: mav::MavMissionType) {
-        let ack = mav::MISSION_ACK_DATA {
-            target_system: to.0,
-            target_component: to.1,
-            mavtype: result,
-            mission_type,
-            opaque_id: 0,
-        };
+        let ack =
+            mav::MISSION_ACK_DATA { target_system: to.0, target_component: to.1, mavtype: result, mission_type, opaque_id: 0 };
         self.reply(link, MavMessage::MISSION_ACK(ack));
     }
 

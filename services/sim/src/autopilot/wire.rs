@@ -10,6 +10,10 @@ const COMMAND_OFFSET: usize = 28;
 
 /// A frame that was understood.
 #[derive(Debug, Clone)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "the large one is the usual one, and a box for each would be an allocation a message"
+)]
 pub enum Inbound {
     /// A message of the dialect.
     Message(MavHeader, MavMessage),
@@ -28,8 +32,7 @@ impl Inbound {
     /// What a frame of valid checksum says; `None` when it says nothing that this dialect has.
     #[must_use]
     pub fn decode(raw: &MAVLinkMessageRaw) -> Option<Self> {
-        let header =
-            MavHeader { system_id: raw.system_id(), component_id: raw.component_id(), sequence: raw.sequence() };
+        let header = MavHeader { system_id: raw.system_id(), component_id: raw.component_id(), sequence: raw.sequence() };
         match MavMessage::parse(raw.version(), raw.message_id(), raw.payload()) {
             Ok(message) => Some(Self::Message(header, message)),
             Err(ParserError::InvalidEnum { enum_type: "MavCmd", .. }) if COMMAND_IDS.contains(&raw.message_id()) => {
@@ -48,6 +51,10 @@ impl Inbound {
 
 /// What the autopilot says.
 #[derive(Debug, Clone)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "the large one is the usual one, and a box for each would be an allocation a message"
+)]
 pub enum Outbound {
     /// A message of the dialect.
     Message(MavMessage),
