@@ -57,7 +57,11 @@ impl<T> Within<T> for Result<T, FieldError> {
 }
 
 /// A nested message that must be there, converted.
-pub(crate) fn required<P, T>(path: &str, value: Option<P>, convert: impl FnOnce(P) -> Result<T, FieldError>) -> Result<T, FieldError> {
+pub(crate) fn required<P, T>(
+    path: &str,
+    value: Option<P>,
+    convert: impl FnOnce(P) -> Result<T, FieldError>,
+) -> Result<T, FieldError> {
     convert(value.ok_or_else(|| FieldError::new(path, "is missing"))?).within(path)
 }
 
@@ -75,7 +79,11 @@ pub(crate) fn finite(path: &str, value: f64) -> Result<f64, FieldError> {
 }
 
 pub(crate) fn positive(path: &str, value: f64) -> Result<f64, FieldError> {
-    if value.is_finite() && value > 0.0 { Ok(value) } else { Err(FieldError::new(path, format!("must be above 0, not {value}"))) }
+    if value.is_finite() && value > 0.0 {
+        Ok(value)
+    } else {
+        Err(FieldError::new(path, format!("must be above 0, not {value}")))
+    }
 }
 
 /// Finite and at least 0: standard deviations, durations.
@@ -105,7 +113,10 @@ pub(crate) fn id<T: std::str::FromStr<Err = halcyon_model::IdError>>(path: &str,
 }
 
 /// An identifier for which the empty string says "none".
-pub(crate) fn optional_id<T: std::str::FromStr<Err = halcyon_model::IdError>>(path: &str, text: &str) -> Result<Option<T>, FieldError> {
+pub(crate) fn optional_id<T: std::str::FromStr<Err = halcyon_model::IdError>>(
+    path: &str,
+    text: &str,
+) -> Result<Option<T>, FieldError> {
     if text.is_empty() { Ok(None) } else { id(path, text).map(Some) }
 }
 

@@ -84,9 +84,7 @@ fn action_to(action: &VehicleAction) -> v1::vehicle_command::Action {
         VehicleAction::Arm => Action::Arm(nothing),
         VehicleAction::Disarm => Action::Disarm(nothing),
         VehicleAction::TakeOff { height_m } => Action::TakeOff(v1::TakeOff { height_m: *height_m }),
-        VehicleAction::GoTo { point, height_m } => {
-            Action::GoTo(v1::GoTo { point: Some(point_to(point)), height_m: *height_m })
-        }
+        VehicleAction::GoTo { point, height_m } => Action::GoTo(v1::GoTo { point: Some(point_to(point)), height_m: *height_m }),
         VehicleAction::Follow { leader, slot } => {
             Action::Follow(v1::FollowLeader { leader_id: leader.to_string(), slot: Some(slot_to(slot)) })
         }
@@ -117,7 +115,9 @@ fn action_from(action: v1::vehicle_command::Action) -> Result<VehicleAction, Fie
         Action::Land(_) => VehicleAction::Land,
         Action::ReturnHome(_) => VehicleAction::Return,
         Action::SetMode(number) => VehicleAction::SetMode(FlightMode::from_copter(number)),
-        Action::SetHeadingRad(heading_rad) => VehicleAction::SetHeading { heading_rad: finite("set_heading_rad", heading_rad)? },
+        Action::SetHeadingRad(heading_rad) => {
+            VehicleAction::SetHeading { heading_rad: finite("set_heading_rad", heading_rad)? }
+        }
         Action::Terminate(_) => VehicleAction::Terminate,
     })
 }

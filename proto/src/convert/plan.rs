@@ -2,7 +2,9 @@ use halcyon_model::{Assignment, Clearance, DispatchPlan, Slot, Stamp, Task};
 
 use super::geo::{point_from, point_to};
 use super::sea::{verdict_state_from, verdict_state_to};
-use crate::field::{FieldError, Within, finite, header, id, optional, optional_id, optionally, positive, required, unspecified};
+use crate::field::{
+    FieldError, Within, finite, header, id, optional, optional_id, optionally, positive, required, unspecified,
+};
 use crate::{SCHEMA_VERSION, Wire, v1};
 
 pub(super) fn slot_to(slot: &Slot) -> v1::Slot {

@@ -9,7 +9,8 @@ pub(super) fn estimate_to(estimate: &Estimate) -> v1::Estimate {
 }
 
 pub(super) fn estimate_from(proto: v1::Estimate) -> Result<Estimate, FieldError> {
-    let estimate = Estimate { value: finite("value", proto.value)?, low: finite("low", proto.low)?, high: finite("high", proto.high)? };
+    let estimate =
+        Estimate { value: finite("value", proto.value)?, low: finite("low", proto.low)?, high: finite("high", proto.high)? };
     if estimate.is_valid() { Ok(estimate) } else { Err(FieldError::new("value", "is not between low and high")) }
 }
 
@@ -47,7 +48,11 @@ fn verdict_to(verdict: &Verdict) -> v1::Verdict {
 
 fn verdict_from(proto: v1::Verdict) -> Result<Verdict, FieldError> {
     let reason = |proto: v1::VerdictReason| {
-        Ok(VerdictReason { check: text("reasons.check", proto.check)?, passed: proto.passed, text: text("reasons.text", proto.text)? })
+        Ok(VerdictReason {
+            check: text("reasons.check", proto.check)?,
+            passed: proto.passed,
+            text: text("reasons.text", proto.text)?,
+        })
     };
     Ok(Verdict {
         state: verdict_state_from("state", proto.state)?.ok_or_else(|| unspecified("state"))?,
@@ -86,7 +91,10 @@ impl Wire for SeaState {
 
     fn from_proto(proto: Self::Proto) -> Result<Self, FieldError> {
         let trace = |point: v1::TracePoint| {
-            Ok(TracePoint { stamp: Stamp::from_nanos(point.stamp_ns), elevation_m: finite("trace.elevation_m", point.elevation_m)? })
+            Ok(TracePoint {
+                stamp: Stamp::from_nanos(point.stamp_ns),
+                elevation_m: finite("trace.elevation_m", point.elevation_m)?,
+            })
         };
         Ok(Self {
             stamp: header(proto.schema_version, proto.stamp_ns)?,

@@ -1,4 +1,6 @@
-use halcyon_model::{CameraIntrinsics, ElevationGrid, Image, Plane, PoseAtExposure, Preview, RigCalibration, StereoPair, SurfacePatch};
+use halcyon_model::{
+    CameraIntrinsics, ElevationGrid, Image, Plane, PoseAtExposure, Preview, RigCalibration, StereoPair, SurfacePatch,
+};
 use nalgebra::Matrix3;
 
 use super::geo::{rotation_from, rotation_to, vector_from, vector_to};
@@ -117,7 +119,10 @@ impl Wire for StereoPair {
         let size = (pair.calibration.width_px, pair.calibration.height_px);
         for (path, image) in [("left", &pair.left), ("right", &pair.right)] {
             if (image.width_px(), image.height_px()) != size {
-                return Err(FieldError::new(path, format!("is {image:?}, but the rig is calibrated for {} x {} px", size.0, size.1)));
+                return Err(FieldError::new(
+                    path,
+                    format!("is {image:?}, but the rig is calibrated for {} x {} px", size.0, size.1),
+                ));
             }
         }
         Ok(pair)

@@ -101,8 +101,7 @@ impl Section for SimSection {
     const NAME: &'static str = "sim";
 
     fn validate(&self) -> Result<(), String> {
-        // The chassis puts the section's name in front itself.
-        self.0.validate().map_err(|problem| problem.trim_start_matches("[sim] ").to_owned())
+        self.0.validate()
     }
 }
 

@@ -43,7 +43,7 @@ impl Default for Config {
     fn default() -> Self {
         let settings = Settings::default();
         Self {
-            rig: "rig-1".into(),
+            rig: "leader-1".into(),
             engine: settings.engine.name().into(),
             block_px: 0,
             disparity_px_min: settings.range.min_px,

@@ -132,15 +132,15 @@ impl SimConfig {
     /// # Errors
     /// One line that names the key, its range and the value.
     pub fn validate(&self) -> Result<(), String> {
-        self.sea.validate().map_err(|error| format!("[sim] {error}"))?;
-        self.rig.validate().map_err(|error| format!("[sim] {error}"))?;
+        self.sea.validate().map_err(|error| format!("{error}"))?;
+        self.rig.validate().map_err(|error| format!("{error}"))?;
         self.wind.validate()?;
         self.gnss.validate()?;
         self.estimator.validate()?;
         self.battery.validate()?;
         self.airframe.validate()?;
         if self.vehicles.len() > VEHICLES_MAX {
-            return Err(format!("[sim] vehicles must be at most {VEHICLES_MAX}, not {}", self.vehicles.len()));
+            return Err(format!("vehicles must be at most {VEHICLES_MAX}, not {}", self.vehicles.len()));
         }
         for (index, vehicle) in self.vehicles.iter().enumerate() {
             let id = &vehicle.id;
@@ -150,13 +150,13 @@ impl SimConfig {
             range(&format!("vehicles ({id}) system_id"), f64::from(self.system_id(index)), 1.0, 250.0)?;
             for (other_index, other) in self.vehicles[..index].iter().enumerate() {
                 if other.id == *id {
-                    return Err(format!("[sim] two vehicles are called {id}"));
+                    return Err(format!("two vehicles are called {id}"));
                 }
                 if self.system_id(other_index) == self.system_id(index) {
-                    return Err(format!("[sim] {} and {id} have the same system_id", other.id));
+                    return Err(format!("{} and {id} have the same system_id", other.id));
                 }
                 if vehicle.mavlink_port != 0 && vehicle.mavlink_port == other.mavlink_port {
-                    return Err(format!("[sim] {} and {id} have the same mavlink_port {}", other.id, other.mavlink_port));
+                    return Err(format!("{} and {id} have the same mavlink_port {}", other.id, other.mavlink_port));
                 }
             }
         }
@@ -165,7 +165,7 @@ impl SimConfig {
             if self.vehicles.iter().any(|vehicle| vehicle.id == fault.vehicle) {
                 Ok(())
             } else {
-                Err(format!("[sim] a fault is for {}, which no vehicle is called", fault.vehicle))
+                Err(format!("a fault is for {}, which no vehicle is called", fault.vehicle))
             }
         })
     }
@@ -180,7 +180,7 @@ impl SimConfig {
 
 /// Refuses what is not in `least..=most`, NaN included, in one line.
 pub(crate) fn range(key: &str, value: f64, least: f64, most: f64) -> Result<(), String> {
-    if (least..=most).contains(&value) { Ok(()) } else { Err(format!("[sim] {key} must be {least} to {most}, not {value}")) }
+    if (least..=most).contains(&value) { Ok(()) } else { Err(format!("{key} must be {least} to {most}, not {value}")) }
 }
 
 /// A vehicle's name as text: the model's nouns know no serde.

@@ -56,7 +56,7 @@ pub struct Config {
 impl Default for Config {
     fn default() -> Self {
         Self {
-            rig: "rig-1".into(),
+            rig: "leader-1".into(),
             fixed_rig: false,
             window_s: 60.0,
             window_s_min: 25.0,

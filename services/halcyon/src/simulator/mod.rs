@@ -22,22 +22,11 @@ use halcyon_chassis::Context;
 use halcyon_model::VehicleId;
 use halcyon_sim::SimConfig;
 use halcyon_sim::water::Water;
-use serde::{Deserialize, Serialize};
 use tokio::net::TcpListener;
 use tokio::task::JoinSet;
 
 /// `[sim]`, as the settings know it.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(transparent)]
-pub struct Config(pub SimConfig);
-
-impl halcyon_chassis::Section for Config {
-    const NAME: &'static str = "sim";
-
-    fn validate(&self) -> Result<(), String> {
-        self.0.validate()
-    }
-}
+pub use halcyon_capture::SimSection as Config;
 
 /// The vehicles' open ports. Cheap to clone: clones are the same ports, so that a restarted simulator keeps them.
 #[derive(Debug, Clone)]

@@ -1,0 +1,103 @@
+//! The command line on real pictures, and in careless hands: one clear line and exit code 2.
+
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+use halcyon_tests::{program, root};
+use serde_json::Value;
+
+fn halcyon(arguments: &[&str]) -> Output {
+    Command::new(program("halcyon")).args(arguments).current_dir(root()).output().expect("halcyon runs")
+}
+
+fn json(output: &Output) -> Value {
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{stderr}");
+    serde_json::from_slice(&output.stdout).unwrap_or_else(|error| panic!("{error}: {stderr}"))
+}
+
+#[track_caller]
+fn refused(arguments: &[&str], expected: &str) {
+    let output = halcyon(arguments);
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {stderr}");
+    assert!(stderr.to_lowercase().contains(&expected.to_lowercase()), "{arguments:?}: {stderr:?} should contain {expected:?}");
+    assert!(!stderr.contains("panicked"), "{stderr}");
+    assert!(output.stdout.is_empty(), "nothing on stdout");
+}
+
+const BOARD: [&str; 4] = ["--board", "9x6", "--square", "0.025"];
+
+fn calibrate<'a>(left: &'a str, right: &'a str, rest: &[&'a str]) -> Vec<&'a str> {
+    [&["calibrate", "--left", left, "--right", right], rest].concat()
+}
+
+#[test]
+fn the_sample_checkerboards_calibrate_to_half_a_pixel() {
+    assert!(root().join("samples/right14.jpg").is_file(), "no sample pictures: run `make samples`");
+    let folder = tempfile::tempdir().expect("a folder");
+    let rig = folder.path().join("rig.yaml");
+    let arguments = calibrate("samples/left??.jpg", "samples/right??.jpg", &BOARD);
+    let report = json(&halcyon(&[&arguments[..], &["--out", rig.to_str().expect("text"), "--json"]].concat()));
+    assert_eq!(report["views_total"], 13);
+    let rms_px = report["stereo_rms_px"].as_f64().expect("a number");
+    assert!(rms_px <= 0.46, "{rms_px}");
+    // The sample's squares are of unit size to OpenCV; its published stereo baseline is 3.33 squares.
+    let baseline_m = report["baseline_m"].as_f64().expect("a number");
+    assert!((baseline_m / 0.025 - 3.34).abs() < 0.05, "{baseline_m}");
+    let text = std::fs::read_to_string(rig).expect("the rig is written");
+    assert!(text.starts_with("%YAML") && text.contains("M1"), "{text}");
+}
+
+#[test]
+fn the_aloe_pair_matches_its_ground_truth() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("d.pfm");
+    let pair = ["match", "--left", "samples/aloeL.jpg", "--right", "samples/aloeR.jpg", "--max-disparity", "256"];
+    let report = json(&halcyon(&[&pair[..], &["--out", out.to_str().expect("text"), "--json"]].concat()));
+    assert!(report["density"].as_f64().expect("a number") > 0.5, "{report:#}");
+    let pfm = std::fs::read(out).expect("the disparity is written");
+    let (width, height) = (report["width_px"].as_u64().expect("a number"), report["height_px"].as_u64().expect("a number"));
+    assert!(pfm.starts_with(format!("Pf\n{width} {height}\n-1").as_bytes()));
+    assert!(pfm.len() as u64 > 4 * width * height);
+}
+
+#[test]
+fn careless_use_is_refused_with_one_line() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let text: PathBuf = folder.path().join("text.jpg");
+    std::fs::write(&text, "this is no picture").expect("a file");
+    let text = text.to_str().expect("text");
+    refused(&calibrate("nothing*.jpg", "nothing*.jpg", &BOARD), "nothing*.jpg");
+    refused(&calibrate("samples/left0?.jpg", "samples/right??.jpg", &BOARD), "");
+    refused(&calibrate("samples/left??.jpg", "samples/right??.jpg", &["--board", "9", "--square", "1"]), "board");
+    refused(&calibrate("samples/left??.jpg", "samples/right??.jpg", &["--board", "9x6", "--square", "nan"]), "square");
+    refused(&calibrate("samples/left??.jpg", "samples/right??.jpg", &["--board", "5x4", "--square", "1"]), "");
+    refused(&calibrate(text, text, &BOARD), "text.jpg");
+    let pair =
+        ["match", "--left", "samples/aloeL.jpg", "--right", "samples/aloeR.jpg", "--out", "/dev/null/d.pfm", "--max-disparity"];
+    for bad in ["0", "-1", "nan", "1e9"] {
+        refused(&[&pair[..], &[bad]].concat(), "disparity");
+    }
+    refused(&["match", "--left", text, "--right", text, "--out", "x.pfm", "--max-disparity", "64"], "text.jpg");
+    refused(&["up", "--sea", "lumpy"], "sea");
+    refused(&["up", "--sea", "jonswap:nan,1"], "height");
+    refused(&["up", "--speed", "0"], "speed");
+    refused(&["up", "--config", "no-such-file.toml"], "no-such-file.toml");
+    refused(&["config", "--set", "capture.rate=1"], "did you mean rate_hz?");
+    refused(&["config", "--set", "captur.rate_hz=1"], "did you mean capture?");
+    refused(&["run", "captain"], "there is no service");
+    refused(&["mission", "--url", "not a url", "list"], "url");
+    refused(&["frobnicate"], "unrecognized");
+}
+
+#[test]
+fn every_command_explains_itself_with_an_example() {
+    for command in
+        [&["up"][..], &["run"], &["calibrate"], &["match"], &["mission"], &["config"], &["sim", "render"], &["sim", "serve"]]
+    {
+        let output = halcyon(&[command, &["--help"]].concat());
+        let text = String::from_utf8_lossy(&output.stdout);
+        assert!(output.status.success() && text.contains("Example: halcyon"), "{command:?}: {text}");
+    }
+}
