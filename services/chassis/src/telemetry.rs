@@ -1,5 +1,6 @@
 //! Logs and metrics. Logs go to stderr, so that stdout stays for results.
 
+use std::io::IsTerminal as _;
 use std::sync::OnceLock;
 
 use metrics_exporter_prometheus::{PrometheusBuilder, PrometheusHandle};
@@ -56,7 +57,10 @@ pub fn init(config: &LogConfig) {
     DONE.get_or_init(|| {
         // Zenoh's own info lines are about its links, for its developers.
         let filter = EnvFilter::try_new(format!("zenoh=warn,{}", config.level)).unwrap_or_else(|_| EnvFilter::new("info"));
-        let builder = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
+        let builder = tracing_subscriber::fmt()
+            .with_env_filter(filter)
+            .with_writer(std::io::stderr)
+            .with_ansi(std::io::stderr().is_terminal());
         let started = match config.format {
             LogFormat::Text => builder.with_target(false).try_init(),
             LogFormat::Json => builder.json().try_init(),

@@ -21,7 +21,7 @@ const PATIENCE: Duration = Duration::from_secs(60);
 #[tokio::test(flavor = "multi_thread")]
 async fn a_pair_becomes_a_patch_and_a_bad_one_does_no_harm() {
     let context = testing::context("reconstruction.test").await;
-    let rig = RigId::new("rig-1").unwrap();
+    let rig = RigId::new("leader-1").unwrap();
     let pairs = context.bus.publisher(&topics::pair(&rig)).await.unwrap();
     let mut surfaces = context.bus.subscribe(&topics::surface(&rig)).await.unwrap();
     let mut previews = context.bus.subscribe(&topics::preview(&rig)).await.unwrap();
@@ -43,7 +43,7 @@ async fn a_pair_becomes_a_patch_and_a_bad_one_does_no_harm() {
         }
     });
     let patch = patch.await.unwrap();
-    assert_eq!((patch.sequence, patch.rig.as_str()), (1, "rig-1"));
+    assert_eq!((patch.sequence, patch.rig.as_str()), (1, "leader-1"));
     assert!((patch.plane.distance_m - 5.0).abs() < 0.01, "{:?}", patch.plane);
     assert!(patch.processing_s > 0.0 && patch.coverage > 0.8);
     let preview = tokio::time::timeout(PATIENCE, previews.recv()).await.unwrap().unwrap();

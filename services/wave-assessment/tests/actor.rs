@@ -15,7 +15,7 @@ use support::{Camera, Sea};
 #[tokio::test(flavor = "multi_thread")]
 async fn patches_in_sea_states_out() {
     let context = context("wave-assessment").await;
-    let rig = RigId::new("rig-1").unwrap();
+    let rig = RigId::new("leader-1").unwrap();
     let mut sea_states = context.bus.subscribe(&topics::sea_state(&rig)).await.unwrap();
     let patches = context.bus.publisher(&topics::surface(&rig)).await.unwrap();
     let config = Config { stale_s: 0.5, period_s: 0.1, ..Config::default() };

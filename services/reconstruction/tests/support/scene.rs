@@ -45,7 +45,7 @@ pub(crate) fn render(rig: &RigCalibration, pose: &PoseAtExposure, surface: Surfa
     let size = (rig.width_px, rig.height_px);
     StereoPair {
         stamp: Stamp::from_secs_f64(1000.0 + seed as f64),
-        rig: RigId::new("rig-1").unwrap(),
+        rig: RigId::new("leader-1").unwrap(),
         sequence: seed,
         left: picture(&rig.left, size, &ned_from_left, &left_ned_m, surface, noise, &mut random),
         right: picture(&rig.right, size, &ned_from_right, &right_ned_m, surface, noise, &mut random),

@@ -167,7 +167,7 @@ impl Camera {
     fn patch(&self, frame: usize, elevation_m: Vec<f32>, level_m: Option<f64>, distance_m: f64) -> SurfacePatch {
         SurfacePatch {
             stamp: start().plus_secs_f64(frame as f64 / self.rate_hz),
-            rig: RigId::new("rig-1").unwrap(),
+            rig: RigId::new("leader-1").unwrap(),
             sequence: frame as u64,
             grid: ElevationGrid {
                 south_west_north_m: self.north_m,
