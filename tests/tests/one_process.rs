@@ -3,7 +3,7 @@
 use std::process::Command;
 use std::time::Duration;
 
-use halcyon_tests::{Gateway, Running, free_port, program, wait_for};
+use halcyon_tests::{Gateway, Running, alone, free_port, program, wait_for};
 use serde_json::Value;
 
 /// Simulated seconds per second: far from what a loaded two-core machine can do, and quick enough.
@@ -23,6 +23,7 @@ fn once(arguments: &[&str]) -> (Option<i32>, Value) {
 
 #[test]
 fn a_mission_over_calm_water_ends_with_a_landing() {
+    let _alone = alone();
     let (code, report) = once(&["--leaders", "1", "--followers", "2", "--seed", "7", "--auto-approve"]);
     assert_eq!(code, Some(0), "{report:#}");
     assert_eq!(report["outcome"], "completed", "{report:#}");
@@ -45,6 +46,7 @@ fn a_mission_over_calm_water_ends_with_a_landing() {
 
 #[test]
 fn rough_water_sends_nobody() {
+    let _alone = alone();
     let (code, report) =
         once(&["--leaders", "1", "--followers", "1", "--seed", "3", "--sea", "jonswap:0.45,2.2", "--auto-approve"]);
     assert_eq!(code, Some(1), "{report:#}");
@@ -57,6 +59,7 @@ fn rough_water_sends_nobody() {
 
 #[test]
 fn the_dashboard_is_there_and_a_signal_ends_everything() {
+    let _alone = alone();
     let folder = tempfile::tempdir().expect("a folder");
     let port = free_port();
     let listen = format!("127.0.0.1:{port}");

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::Duration;
 
-use halcyon_tests::{Gateway, Running, free_port, wait_for};
+use halcyon_tests::{Gateway, Running, alone, free_port, wait_for};
 use serde_json::json;
 
 /// Simulated seconds per second.
@@ -132,6 +132,7 @@ fn start(folder: &Path, config: &str, name: &str, arguments: &[String]) -> Runni
 
 #[test]
 fn a_mission_across_processes_ends_with_a_landing() {
+    let _alone = alone();
     let host = Host::start();
     wait_for(Duration::from_secs(60), "the gateway answers", || host.gateway.is_up());
     host.create("m1");
@@ -145,6 +146,7 @@ fn a_mission_across_processes_ends_with_a_landing() {
 /// Each service is killed without a goodbye while the mission runs, and started again.
 #[test]
 fn any_service_may_die_and_the_mission_still_ends() {
+    let _alone = alone();
     let mut host = Host::start();
     wait_for(Duration::from_secs(60), "the gateway answers", || host.gateway.is_up());
     host.create("m2");
