@@ -13,10 +13,11 @@ const PHASE: Duration = Duration::from_secs(150);
 
 /// A world with one leader and one follower, in which every service is a process.
 struct Host {
-    folder: tempfile::TempDir,
     config: String,
     processes: Vec<(&'static str, Vec<String>, Option<Running>)>,
     gateway: Gateway,
+    /// Last, so that the processes and what they logged are dropped before it.
+    folder: tempfile::TempDir,
 }
 
 impl Host {
@@ -61,7 +62,7 @@ listen = "127.0.0.1:{http}"
         );
         let config = folder.path().join("fleet.toml").to_string_lossy().into_owned();
         std::fs::write(&config, text).expect("the configuration can be written");
-        let mut host = Self { folder, config, processes: Vec::new(), gateway: Gateway::new(http) };
+        let mut host = Self { config, processes: Vec::new(), gateway: Gateway::new(http), folder };
         let router = ["run", "mesh", "--set", "bus.mode=router", "--set"].map(String::from).to_vec();
         host.add(
             "mesh",

@@ -136,13 +136,13 @@ impl Process {
     }
 
     /// Waits for SIGINT, SIGTERM or [`Self::stop`], or until every service has ended by itself; then stops all, within a few
-    /// seconds, and closes the session.
+    /// seconds, and closes the session. A process without services is a router for others, and waits for the signal.
     pub async fn wait(mut self) {
         let stop = self.stop.clone();
         tokio::select! {
             () = stop.cancelled() => {}
             () = signalled() => info!("stopping"),
-            () = async { while self.services.join_next().await.is_some() {} } => {}
+            () = ended(&mut self.services) => {}
         }
         self.stop.cancel();
         let drained =
@@ -159,6 +159,14 @@ impl Process {
             warn!("the bus session did not close in time");
         }
     }
+}
+
+/// Until the last of some services has ended by itself; never where there is none.
+async fn ended(services: &mut JoinSet<()>) {
+    if services.is_empty() {
+        std::future::pending::<()>().await;
+    }
+    while services.join_next().await.is_some() {}
 }
 
 /// SIGINT or SIGTERM.
