@@ -96,7 +96,7 @@ impl Wire for SeaState {
                 elevation_m: finite("trace.elevation_m", point.elevation_m)?,
             })
         };
-        Ok(Self {
+        let sea_state = Self {
             stamp: header(proto.schema_version, proto.stamp_ns)?,
             rig: id("rig_id", &proto.rig_id)?,
             window_start: Stamp::from_nanos(proto.window_start_ns),
@@ -113,6 +113,12 @@ impl Wire for SeaState {
             slope_rms_rad: optional("slope_rms_rad", proto.slope_rms_rad, estimate_from)?,
             trace: proto.trace.into_iter().map(trace).collect::<Result<_, _>>()?,
             verdict: required("verdict", proto.verdict, verdict_from)?,
-        })
+        };
+        // Somebody may land on this word: it needs its evidence.
+        let unfounded = sea_state.h_s_m.is_none() || sea_state.patches == 0 || sea_state.verdict.reasons.iter().any(|reason| !reason.passed);
+        if sea_state.verdict.state == VerdictState::Safe && unfounded {
+            return Err(FieldError::new("verdict.state", "is safe without a measurement, or against a failed check"));
+        }
+        Ok(sea_state)
     }
 }

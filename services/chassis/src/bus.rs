@@ -213,6 +213,8 @@ impl Bus {
             .payload(halcyon_proto::encode(command))
             .encoding(encoding::<C>())
             .priority(zenoh::qos::Priority::InteractiveHigh)
+            // The answer inherits it: a vehicle must not wait for a stalled link in order to say no.
+            .congestion_control(CongestionControl::Drop)
             .timeout(timeout)
             .with(zenoh::handlers::FifoChannel::new(4))
             .await

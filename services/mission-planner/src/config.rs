@@ -16,7 +16,8 @@ pub struct Config {
     pub plan_period_s: f64,
     /// How long a plan is valid. A vehicle whose plan lapsed flies its fail-safe.
     pub plan_validity_s: f64,
-    /// How far from the fleet's origin a mission may be.
+    /// How far from the fleet's origin a mission may be. The stand-off and the slots reach further: keep it well inside the
+    /// vehicles' own fence.
     pub range_max_m: f64,
     /// Lowest survey height above mean water.
     pub survey_height_min_m: f64,
@@ -96,7 +97,7 @@ impl Default for Config {
             step_s: 0.2,
             plan_period_s: 0.5,
             plan_validity_s: 5.0,
-            range_max_m: 2000.0,
+            range_max_m: 450.0,
             survey_height_min_m: 3.0,
             survey_height_max_m: 30.0,
             missions_max: 16,

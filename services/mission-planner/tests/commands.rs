@@ -20,7 +20,7 @@ fn refused(change: impl FnOnce(&mut MissionSpec), words: &str) {
 fn a_mission_that_cannot_be_flown_is_refused() {
     refused(|s| s.point = LocalPoint::new(f64::NAN, 0.0), "finite");
     refused(|s| s.point = LocalPoint::new(0.0, f64::INFINITY), "finite");
-    refused(|s| s.point = LocalPoint::new(1500.0, 1400.0), "2052 m from the fleet's origin, at most 2000 m");
+    refused(|s| s.point = LocalPoint::new(400.0, 300.0), "500 m from the fleet's origin, at most 450 m");
     refused(|s| s.survey_height_m = 2.9, "survey height must be 3 to 30 m, not 2.9 m");
     refused(|s| s.survey_height_m = 31.0, "survey height");
     refused(|s| s.survey_height_m = f64::NAN, "survey height");

@@ -52,11 +52,6 @@ impl Control {
         self.hands_off = false;
     }
 
-    /// A person asked us, in so many words, to take the vehicle back.
-    pub fn reclaim(&mut self) {
-        self.hands_off = false;
-    }
-
     /// Takes the observed mode.
     pub fn observe(&mut self, mode: FlightMode, armed: bool, now: Stamp) -> Change {
         let before = self.hands_off;
@@ -149,7 +144,10 @@ mod tests {
         control.expect(Guided, t(1.0));
         control.observe(Guided, false, t(1.2));
         assert_eq!(control.observe(Loiter, false, t(2.0)), Change::TakenOver);
-        control.reclaim();
+        control.expect(Guided, t(3.0));
+        assert_eq!(control.observe(Loiter, false, t(4.0)), Change::None, "asked, and refused");
+        assert!(control.hands_off(), "until the autopilot says GUIDED it is the pilot's");
+        control.observe(Guided, false, t(5.0));
         assert!(!control.hands_off());
     }
 

@@ -137,9 +137,9 @@ impl Executor {
 
     fn set_mode(&mut self, mode: FlightMode, now: Stamp) -> Decision {
         if mode == FlightMode::Guided {
-            // The one way back to the plan.
+            // The one way back to the plan. The vehicle is ours again once the autopilot says GUIDED, not before: it may refuse,
+            // and asking on would fight the pilot.
             self.direct = None;
-            self.control.reclaim();
             if !self.airborne {
                 self.flown = None;
             }

@@ -18,6 +18,9 @@ impl Executor {
     pub(super) fn touched_down(&mut self) {
         if let (Some(Goal::Land { .. }), Some(own)) = (&self.active, &self.own)
             && !self.control.hands_off()
+            // Motors cut in the air, and a fail-safe's landing without a clearance, are no landing of the task's.
+            && !matches!(self.activity, Activity::FailSafe { .. })
+            && -own.state.position_ned_m.z <= self.config.limits.land_mode_height_m + 1.0
         {
             self.touchdown = Some(LocalPoint::from(own.state.position_ned_m));
         }
