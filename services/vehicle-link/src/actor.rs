@@ -7,7 +7,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use anyhow::Context as _;
+use anyhow::bail;
 use halcyon_chassis::{Context, EventDraft, Incoming, Publisher, topics};
 use halcyon_model::{CommandReply, Stamp, VehicleCommand, VehicleId, VehicleState};
 use tracing::{debug, info, trace, warn};
@@ -41,7 +41,12 @@ pub async fn run(context: Context, config: Config) -> anyhow::Result<()> {
     loop {
         tokio::select! {
             () = context.stop.cancelled() => return Ok(()),
-            event = link.recv() => service.observe_link(event.context("the link's task has ended")?, &link).await,
+            event = link.recv() => match event {
+                Some(event) => service.observe_link(event, &link).await,
+                // Told to stop, the link's task may be the first to hear it.
+                None if context.stop.is_cancelled() => return Ok(()),
+                None => bail!("the link's task has ended"),
+            },
             plan = plans.recv() => {
                 let answer = service.executor.observe_plan(&plan?, context.clock.now());
                 match answer {
