@@ -71,6 +71,9 @@ pub enum CommandError {
     /// Too many commands are under way.
     #[error("{OPEN_MAX} commands are under way already")]
     Busy,
+    /// There is nobody to ask.
+    #[error("the autopilot is not heard")]
+    NotHeard,
     /// The link went down before an answer.
     #[error("the link to the autopilot was lost before it answered")]
     LinkLost,
