@@ -123,7 +123,7 @@ impl Autopilot {
 
     /// Stops asking for anything that moves the vehicle.
     pub fn withdraw(&mut self) -> Vec<Effect> {
-        self.commands.withdraw()
+        self.commands.withdraw(self.telemetry.mode())
     }
 
     /// The connection was lost: whoever answers next may be another program, or the autopilot after a restart.
