@@ -307,6 +307,19 @@ fn after_a_restart_in_flight_nothing_is_sent_until_a_plan_comes_or_the_grace_end
 }
 
 #[test]
+fn a_fail_safes_landing_elsewhere_is_not_finished_on_the_landing_places_clearance() {
+    let mut world = World::new(&[(0.0, 0.0)]);
+    world.airborne(0, Vector3::new(20.0, 0.0, -5.0));
+    world.run(1.0, cleared);
+    world.copters[0].estimator_ok = false;
+    world.until(20.0, cleared, |world| world.copters[0].mode == FlightMode::Land && world.height(0) < 4.0);
+    assert!(world.copters[0].position.x < 36.0, "it was still on the way: {}", world.copters[0].position);
+    world.copters[0].estimator_ok = true;
+    world.until(120.0, cleared, |world| down(world, 0));
+    assert!((world.copters[0].position - Vector3::new(40.0, 0.0, 0.0)).norm() < 1.0, "{}", world.copters[0].position);
+}
+
+#[test]
 fn after_a_restart_a_landing_under_way_is_finished_and_one_that_is_over_is_not_repeated() {
     let mut world = World::new(&[(0.0, 0.0)]);
     world.airborne(0, Vector3::new(40.0, 0.0, -1.0));
