@@ -227,6 +227,19 @@ fn water_measured_before_the_leader_settled_or_elsewhere_says_nothing() {
 }
 
 #[test]
+fn a_follower_that_may_float_somewhere_is_not_sent() {
+    let mut world = World::new(1, 1);
+    let follower = world.vehicle("follower-1");
+    follower.position_m = nalgebra::Vector3::new(70.0, 0.0, 0.0);
+    follower.home_known = false;
+    world.create("m", spec(60.0, 0.0));
+    world.run_to("m", Approved, 120.0);
+    world.run(20.0);
+    assert_eq!(world.phase("m"), Approved);
+    assert!(world.notices.iter().any(|notice| notice.why.contains("home is not known")), "{:?}", world.notices);
+}
+
+#[test]
 fn abort_from_every_phase_brings_everyone_home_and_frees_them() {
     for phase in UNDER_WAY.into_iter().chain([Paused]) {
         let mut world = world_in(if phase == Paused { Landing } else { phase });

@@ -222,7 +222,11 @@ pub(super) fn role_name(role: Role) -> &'static str {
 
 /// A vehicle that sits away from its home is a follower on the water: it stays there unless a person asks for it by name.
 fn away_from_home(state: &VehicleState, named: bool, config: &Config) -> Option<String> {
-    let from_home = LocalFrame::new(state.home?).ned_from_geodetic(state.position);
-    let away_m = from_home.xy().norm();
-    (!named && away_m > config.home_radius_m).then(|| format!("on the ground {away_m:.0} m from its home"))
+    if named {
+        return None;
+    }
+    // Its link may just have been restarted, and heard everything else sooner.
+    let Some(home) = state.home else { return Some("its home is not known, so that it may be on the water".into()) };
+    let away_m = LocalFrame::new(home).ned_from_geodetic(state.position).xy().norm();
+    (away_m > config.home_radius_m).then(|| format!("on the ground {away_m:.0} m from its home"))
 }
