@@ -9,6 +9,9 @@ use crate::config::Config;
 /// Vehicles that are kept in mind; more are ignored, so that a flood of names cannot fill the memory.
 const VEHICLES_MAX: usize = 256;
 
+/// Vehicles whose reasons are told one by one: what a fleet of a hundred says is too long for people, and for the wire.
+const REASONS_MAX: usize = 8;
+
 /// Why a message was not taken in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Ignored {
@@ -168,7 +171,7 @@ impl Fleet {
     /// choice is always the same.
     ///
     /// # Errors
-    /// One line with a reason for every vehicle of that role.
+    /// One line with a reason for every vehicle of that role, as far as they are few.
     pub(super) fn pick(
         &self,
         role: Role,
@@ -206,7 +209,12 @@ impl Fleet {
                 Some(named) => format!("{named} has not been heard"),
                 None => format!("no {} has been heard", role_name(role)),
             }),
-            None => Err(reasons.join("; ")),
+            None => {
+                let more = reasons.len().saturating_sub(REASONS_MAX);
+                reasons.truncate(REASONS_MAX);
+                reasons.extend((more > 0).then(|| format!("{more} more")));
+                Err(reasons.join("; "))
+            }
         }
     }
 }
