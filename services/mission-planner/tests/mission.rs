@@ -227,6 +227,35 @@ fn water_measured_before_the_leader_settled_or_elsewhere_says_nothing() {
 }
 
 #[test]
+fn a_follower_that_may_float_somewhere_is_not_sent() {
+    let mut world = World::new(1, 1);
+    let follower = world.vehicle("follower-1");
+    follower.position_m = nalgebra::Vector3::new(70.0, 0.0, 0.0);
+    follower.home_known = false;
+    world.create("m", spec(60.0, 0.0));
+    world.run_to("m", Approved, 120.0);
+    world.run(20.0);
+    assert_eq!(world.phase("m"), Approved);
+    assert!(world.notices.iter().any(|notice| notice.why.contains("home is not known")), "{:?}", world.notices);
+}
+
+/// The wire refuses texts over 4096 bytes: the mission's end would never be seen.
+#[test]
+fn what_a_large_fleet_waits_for_still_fits_a_message() {
+    let mut world = World::new(1, 100);
+    for vehicle in world.vehicles.iter_mut().filter(|vehicle| vehicle.id.as_str() != "leader-1") {
+        vehicle.ready = false;
+        vehicle.activity = halcyon_model::Activity::FailSafe { reason: "position not good enough to fly by".into() };
+        vehicle.stuck = true;
+    }
+    world.create("m", spec(60.0, 0.0));
+    assert_eq!(world.run_to_end("m", 600.0), Failed);
+    let texts = world.mission("m").history.iter().map(|step| &step.why).chain(world.notices.iter().map(|notice| &notice.why));
+    let longest = texts.max_by_key(|text| text.len()).unwrap();
+    assert!(longest.len() < 2000 && longest.contains("92 more"), "{} bytes: {longest}", longest.len());
+}
+
+#[test]
 fn abort_from_every_phase_brings_everyone_home_and_frees_them() {
     for phase in UNDER_WAY.into_iter().chain([Paused]) {
         let mut world = world_in(if phase == Paused { Landing } else { phase });

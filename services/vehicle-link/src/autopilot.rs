@@ -109,17 +109,21 @@ impl Autopilot {
         self.telemetry.missing()
     }
 
-    /// Puts a command in line.
+    /// Puts a command in line. Never before the autopilot is heard: what waited for it would be carried out when whoever asked has
+    /// long given up.
     ///
     /// # Errors
-    /// As [`Commands::submit`].
+    /// [`CommandError::NotHeard`], or as [`Commands::submit`].
     pub fn submit(&mut self, ticket: Ticket, command: Command) -> Result<(), CommandError> {
+        if self.address.is_none() {
+            return Err(CommandError::NotHeard);
+        }
         self.commands.submit(ticket, command)
     }
 
     /// Stops asking for anything that moves the vehicle.
     pub fn withdraw(&mut self) -> Vec<Effect> {
-        self.commands.withdraw()
+        self.commands.withdraw(self.telemetry.mode())
     }
 
     /// The connection was lost: whoever answers next may be another program, or the autopilot after a restart.
@@ -151,5 +155,42 @@ impl Autopilot {
     pub fn header(&self) -> MavHeader {
         let system = self.address.map(Address::system).or(self.wanted).unwrap_or(SYSTEM_BEFORE);
         MavHeader { system_id: system.into(), component_id: OWN_COMPONENT, sequence: 0 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use mavlink::dialects::ardupilotmega as ardu;
+
+    use super::*;
+
+    fn t(s: f64) -> Stamp {
+        Stamp::from_secs_f64(1000.0).plus_secs_f64(s)
+    }
+
+    fn heartbeat() -> (MavHeader, MavMessage) {
+        let data =
+            ardu::HEARTBEAT_DATA { autopilot: MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA, custom_mode: 4, ..Default::default() };
+        (MavHeader { system_id: 7u8.into(), component_id: AUTOPILOT_COMPONENT, sequence: 0 }, MavMessage::HEARTBEAT(data))
+    }
+
+    fn terminations(effects: &[Effect]) -> usize {
+        let is_one =
+            |effect: &&Effect| matches!(effect, Effect::Send(MavMessage::COMMAND_LONG(data)) if data.param2 == 21196.0);
+        effects.iter().filter(is_one).count()
+    }
+
+    #[test]
+    fn a_command_does_not_wait_for_an_autopilot_that_comes_back_later() {
+        let origin = FleetOrigin(halcyon_model::Geodetic::from_deg(53.1, -2.9, 0.0));
+        let mut autopilot = Autopilot::new(&Config::default(), origin, t(0.0)).unwrap();
+        let (header, message) = heartbeat();
+        assert_eq!(autopilot.submit(1, Command::Arm), Err(CommandError::NotHeard));
+        autopilot.observe(header, &message, t(0.0));
+        assert_eq!(autopilot.submit(2, Command::SetMode(halcyon_model::FlightMode::Loiter)), Ok(()));
+        autopilot.link_down();
+        assert_eq!(autopilot.submit(3, Command::Disarm { force: true }), Err(CommandError::NotHeard));
+        autopilot.observe(header, &message, t(9.0));
+        assert_eq!(terminations(&autopilot.poll(t(9.0))), 0, "the motors would stop nine seconds after the refusal");
     }
 }

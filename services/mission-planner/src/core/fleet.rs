@@ -9,6 +9,9 @@ use crate::config::Config;
 /// Vehicles that are kept in mind; more are ignored, so that a flood of names cannot fill the memory.
 const VEHICLES_MAX: usize = 256;
 
+/// Vehicles whose reasons are told one by one: what a fleet of a hundred says is too long for people, and for the wire.
+const REASONS_MAX: usize = 8;
+
 /// Why a message was not taken in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Ignored {
@@ -168,7 +171,7 @@ impl Fleet {
     /// choice is always the same.
     ///
     /// # Errors
-    /// One line with a reason for every vehicle of that role.
+    /// One line with a reason for every vehicle of that role, as far as they are few.
     pub(super) fn pick(
         &self,
         role: Role,
@@ -206,7 +209,12 @@ impl Fleet {
                 Some(named) => format!("{named} has not been heard"),
                 None => format!("no {} has been heard", role_name(role)),
             }),
-            None => Err(reasons.join("; ")),
+            None => {
+                let more = reasons.len().saturating_sub(REASONS_MAX);
+                reasons.truncate(REASONS_MAX);
+                reasons.extend((more > 0).then(|| format!("{more} more")));
+                Err(reasons.join("; "))
+            }
         }
     }
 }
@@ -222,7 +230,11 @@ pub(super) fn role_name(role: Role) -> &'static str {
 
 /// A vehicle that sits away from its home is a follower on the water: it stays there unless a person asks for it by name.
 fn away_from_home(state: &VehicleState, named: bool, config: &Config) -> Option<String> {
-    let from_home = LocalFrame::new(state.home?).ned_from_geodetic(state.position);
-    let away_m = from_home.xy().norm();
-    (!named && away_m > config.home_radius_m).then(|| format!("on the ground {away_m:.0} m from its home"))
+    if named {
+        return None;
+    }
+    // Its link may just have been restarted, and heard everything else sooner.
+    let Some(home) = state.home else { return Some("its home is not known, so that it may be on the water".into()) };
+    let away_m = LocalFrame::new(home).ned_from_geodetic(state.position).xy().norm();
+    (away_m > config.home_radius_m).then(|| format!("on the ground {away_m:.0} m from its home"))
 }

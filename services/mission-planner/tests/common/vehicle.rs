@@ -27,6 +27,8 @@ pub struct FakeVehicle {
     pub generation: u64,
     pub battery: Option<f64>,
     pub ready: bool,
+    /// It knows where its home is.
+    pub home_known: bool,
     pub touchdown: Option<LocalPoint>,
     /// Says nothing and hears nothing.
     pub silent: bool,
@@ -56,6 +58,7 @@ impl FakeVehicle {
             generation: 0,
             battery: Some(0.9),
             ready: true,
+            home_known: true,
             touchdown: None,
             silent: false,
             stuck: false,
@@ -229,7 +232,7 @@ impl FakeVehicle {
             velocity_ned_mps: Vector3::zeros(),
             ned_from_body: UnitQuaternion::from_euler_angles(0.0, 0.0, self.heading_rad),
             heading_rad: self.heading_rad,
-            home: Some(frame.geodetic_from_ned(Vector3::new(self.home.north_m, self.home.east_m, 0.0))),
+            home: self.home_known.then(|| frame.geodetic_from_ned(Vector3::new(self.home.north_m, self.home.east_m, 0.0))),
             mode: FlightMode::Guided,
             armed: self.armed,
             landed: if self.airborne() { LandedState::InAir } else { LandedState::OnGround },

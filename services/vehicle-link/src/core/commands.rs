@@ -71,6 +71,9 @@ pub enum CommandError {
     /// Too many commands are under way.
     #[error("{OPEN_MAX} commands are under way already")]
     Busy,
+    /// There is nobody to ask.
+    #[error("the autopilot is not heard")]
+    NotHeard,
     /// The link went down before an answer.
     #[error("the link to the autopilot was lost before it answered")]
     LinkLost,
@@ -178,26 +181,35 @@ impl Commands {
         effects
     }
 
-    /// Stops sending whatever would change mode or motors: the pilot took over.
-    pub fn withdraw(&mut self) -> Vec<Effect> {
+    /// Stops sending whatever would change mode or motors: the vehicle went into `mode`, which guidance didn't ask for. If a
+    /// person asked for it here, that was done, whether or not the acknowledgement has come.
+    pub fn withdraw(&mut self, mode: Option<FlightMode>) -> Vec<Effect> {
         let mut ended = Vec::new();
         self.open.retain(|open| {
             let keep = matches!(open.command, Command::SetInterval(_));
             if !keep {
-                ended.push(Effect::Done(open.ticket, open.command, Err(CommandError::Withdrawn)));
+                let reached = mode.is_some_and(|mode| open.command == Command::SetMode(mode));
+                let outcome = if reached { Ok(()) } else { open.cut_short(CommandError::Withdrawn) };
+                ended.push(Effect::Done(open.ticket, open.command, outcome));
             }
             keep
         });
         ended
     }
 
-    /// The link is down: nothing that was under way has an outcome.
+    /// The link is down: what was not acknowledged has no outcome.
     pub fn abandon(&mut self) -> Vec<Effect> {
-        self.open.drain(..).map(|open| Effect::Done(open.ticket, open.command, Err(CommandError::LinkLost))).collect()
+        let end = |open: Transaction| Effect::Done(open.ticket, open.command, open.cut_short(CommandError::LinkLost));
+        self.open.drain(..).map(end).collect()
     }
 }
 
 impl Transaction {
+    /// The outcome if it ends now, because of `error`.
+    fn cut_short(&self, error: CommandError) -> Result<(), CommandError> {
+        if matches!(self.phase, Phase::Accepted) { Ok(()) } else { Err(error) }
+    }
+
     /// Whether the transaction goes on.
     fn step(&mut self, to: Address, texts: &Texts, now: Stamp, effects: &mut Vec<Effect>) -> bool {
         let outcome = match self.phase {
@@ -410,6 +422,25 @@ mod tests {
             }
         }
         assert!(matches!(ended, Some((599..=602, Err(CommandError::TimedOut { .. })))), "{ended:?}");
+    }
+
+    /// The new mode's heartbeat often overtakes the acknowledgement, and both come within one step.
+    #[test]
+    fn a_mode_that_a_person_asked_for_and_got_was_not_withdrawn() {
+        let asked = |acknowledged: bool, mode: FlightMode| {
+            let mut commands = Commands::default();
+            commands.submit(5, Command::SetMode(FlightMode::Loiter)).unwrap();
+            commands.poll(to(), &Texts::default(), t(0.0));
+            if acknowledged {
+                let ack = ack(MavCmd::MAV_CMD_DO_SET_MODE, MavResult::MAV_RESULT_ACCEPTED, OWN);
+                commands.observe_ack(&ack, OWN.0, OWN.1, t(0.1));
+            }
+            let [Effect::Done(5, _, outcome)] = &commands.withdraw(Some(mode))[..] else { panic!("no outcome") };
+            outcome.clone()
+        };
+        assert_eq!(asked(true, FlightMode::Loiter), Ok(()));
+        assert_eq!(asked(false, FlightMode::Loiter), Ok(()));
+        assert_eq!(asked(false, FlightMode::Stabilize), Err(CommandError::Withdrawn));
     }
 
     #[test]

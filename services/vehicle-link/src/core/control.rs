@@ -75,8 +75,8 @@ impl Control {
             self.hands_off = armed || self.ours.is_some();
             self.ours = None;
             self.expected = None;
-        } else if armed && self.ours != Some(mode) && self.expected.is_none() {
-            // Armed by someone in a mode that isn't ours.
+        } else if armed && self.ours != Some(mode) {
+            // Armed by someone in a mode that isn't ours, even while we ask for another: we arm only in GUIDED.
             self.hands_off = true;
         } else if disarmed {
             // The flight is over; so is whoever's turn it was.
@@ -157,6 +157,15 @@ mod tests {
         control.observe(Loiter, false, t(0.0));
         assert_eq!(control.observe(Loiter, true, t(1.0)), Change::TakenOver);
         assert_eq!(control.observe(Loiter, false, t(60.0)), Change::HandedBack);
+    }
+
+    #[test]
+    fn armed_while_we_still_ask_for_guided_is_the_pilots_flight() {
+        let mut control = Control::default();
+        control.observe(Stabilize, false, t(0.0));
+        control.expect(Guided, t(1.0));
+        assert_eq!(control.observe(Stabilize, true, t(2.0)), Change::TakenOver);
+        assert!(control.hands_off());
     }
 
     #[test]

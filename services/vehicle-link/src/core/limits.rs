@@ -163,7 +163,8 @@ pub struct FailSafeLimits {
     pub hold_s: f64,
     /// Over the landing place without a clearance for so long: return, seconds.
     pub clearance_wait_s: f64,
-    /// No plan and no clearance is believed for longer than this after it was received, whatever it says, seconds.
+    /// No plan and no clearance is believed for longer than this after it was received, whatever it says, seconds. Nor for longer
+    /// than from its plan's stamp to its own end: a clock that is behind gives no time.
     pub validity_s_max: f64,
 }
 

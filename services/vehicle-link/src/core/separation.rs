@@ -26,7 +26,7 @@ const OPENING_MPS_MAX: f64 = 2.0;
 /// A silent vehicle may have gone anywhere: its kept distance grows by this much a second, up to [`GROWTH_M_MAX`].
 const GROWTH_MPS: f64 = 0.5;
 const GROWTH_M_MAX: f64 = 3.0;
-/// A flying vehicle silent for so long is forgotten, seconds; a parked one stays where it was.
+/// A flying vehicle of which nothing has come for so long is forgotten, seconds; a parked one stays where it was.
 const FORGET_S: f64 = 30.0;
 /// Projections over all constraints; a handful of vehicles converges in two or three.
 const PASSES: usize = 8;
@@ -53,7 +53,8 @@ pub fn obstacle(track: &Track, own_follows: bool, limits: &Limits, now: Stamp) -
         let keep_m = limits.separation_parked_m;
         return Some(Obstacle { position_ned_m, velocity_ned_mps: Vector3::zeros(), keep_m, yields_beyond_m: None });
     }
-    if silent_s > FORGET_S {
+    // By receipt, not by stamp: one that has lost its autopilot, or the time, is in the way all the same.
+    if track.unheard_s(now) > FORGET_S {
         return None;
     }
     let motion = track.predict(now, 0.0);

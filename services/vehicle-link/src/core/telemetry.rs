@@ -200,6 +200,12 @@ impl Telemetry {
         self.heartbeat.map(|heartbeat| heartbeat.1)
     }
 
+    /// The mode that was last heard.
+    #[must_use]
+    pub fn mode(&self) -> Option<FlightMode> {
+        self.heartbeat.map(|heartbeat| heartbeat.0.0)
+    }
+
     /// What is still missing before there is a state, for people.
     #[must_use]
     pub fn missing(&self) -> &'static str {

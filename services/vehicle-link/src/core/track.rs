@@ -12,6 +12,8 @@ const ACCELERATION_MPS2_MAX: f64 = 4.0;
 const YAW_RATE_RADPS_MAX: f64 = 2.5;
 /// Never predict further ahead than this, seconds.
 const PREDICTION_S_MAX: f64 = 1.0;
+/// A stamp this far ahead of the present is an error of its clock, and does not keep newer states out, seconds.
+const AHEAD_S_MAX: f64 = 2.0;
 
 /// Another vehicle's newest state, with what two of them tell: acceleration and yaw rate.
 #[derive(Debug, Clone)]
@@ -20,6 +22,8 @@ pub struct Track {
     pub state: VehicleState,
     /// When it was received.
     pub received: Stamp,
+    /// When the vehicle last said anything, the same again included.
+    heard: Stamp,
     acceleration_ned_mps2: Vector3<f64>,
     yaw_rate_radps: f64,
 }
@@ -41,16 +45,22 @@ impl Track {
     /// From a first state.
     #[must_use]
     pub fn new(state: VehicleState, now: Stamp) -> Self {
-        Self { state, received: now, acceleration_ned_mps2: Vector3::zeros(), yaw_rate_radps: 0.0 }
+        Self { state, received: now, heard: now, acceleration_ned_mps2: Vector3::zeros(), yaw_rate_radps: 0.0 }
     }
 
-    /// Takes a newer state; one that isn't newer by its stamp changes nothing.
+    /// Takes a newer state. An older one by its stamp changes nothing; the same again, from a vehicle that no longer hears its
+    /// autopilot, tells that it is still there.
     pub fn observe(&mut self, state: VehicleState, now: Stamp) {
         let dt_s = state.stamp.seconds_since(self.state.stamp);
-        if dt_s <= 0.0 {
+        let misdated = self.state.stamp.seconds_since(now) > AHEAD_S_MAX;
+        if dt_s < 0.0 && !misdated {
             return;
         }
-        if dt_s < PREDICTION_S_MAX {
+        self.heard = now;
+        if dt_s == 0.0 {
+            return;
+        }
+        if (0.0..PREDICTION_S_MAX).contains(&dt_s) {
             let gain = dt_s / (FILTER_S + dt_s);
             let acceleration = (state.velocity_ned_mps - self.state.velocity_ned_mps) / dt_s;
             let yaw_rate = wrap_rad(state.heading_rad - self.state.heading_rad) / dt_s;
@@ -66,6 +76,12 @@ impl Track {
         }
         self.state = state;
         self.received = now;
+    }
+
+    /// How long ago it last said anything, even if nothing new, seconds.
+    #[must_use]
+    pub fn unheard_s(&self, now: Stamp) -> f64 {
+        now.seconds_since(self.heard)
     }
 
     /// How long it has been silent, seconds: by its own stamp and by receipt, whichever is longer, since a cache may deliver old
@@ -108,4 +124,67 @@ impl Track {
 pub fn wrap_rad(angle_rad: f64) -> f64 {
     let wrapped = angle_rad.rem_euclid(2.0 * PI);
     if wrapped > PI { wrapped - 2.0 * PI } else { wrapped }
+}
+
+#[cfg(test)]
+mod tests {
+    use halcyon_model::{Activity, Geodetic, LandedState, Role, VehicleId};
+    use nalgebra::UnitQuaternion;
+
+    use super::*;
+
+    fn t(s: f64) -> Stamp {
+        Stamp::from_secs_f64(1000.0).plus_secs_f64(s)
+    }
+
+    fn state(stamp: Stamp, north_m: f64) -> VehicleState {
+        VehicleState {
+            stamp,
+            vehicle: VehicleId::new("other").unwrap(),
+            role: Role::Leader,
+            position: Geodetic::from_deg(53.1, -2.9, 0.0),
+            position_ned_m: Vector3::new(north_m, 0.0, -5.0),
+            velocity_ned_mps: Vector3::zeros(),
+            ned_from_body: UnitQuaternion::identity(),
+            heading_rad: 0.0,
+            home: None,
+            mode: FlightMode::Guided,
+            armed: true,
+            landed: LandedState::InAir,
+            battery_fraction: None,
+            battery_v: None,
+            fix: None,
+            estimator_ok: true,
+            ready_to_arm: true,
+            boot_s: 100.0,
+            activity: Activity::Holding { settled: true },
+            plan_generation: 0,
+            touchdown: None,
+        }
+    }
+
+    /// Its link says the last state again once a second; the autopilot hovers on.
+    #[test]
+    fn one_that_lost_its_autopilot_is_silent_to_follow_but_stays_an_obstacle() {
+        let mut track = Track::new(state(t(0.0), 3.0), t(0.0));
+        for second in 1..=120 {
+            track.observe(state(t(0.0), 3.0), t(f64::from(second)));
+        }
+        let limits = crate::core::limits::Limits::default();
+        assert!(track.silent_s(t(120.0)) > 119.0);
+        assert!(crate::core::separation::obstacle(&track, false, &limits, t(120.0)).is_some(), "it still hovers there");
+        assert!(crate::core::separation::obstacle(&track, false, &limits, t(151.0)).is_none(), "it is gone");
+    }
+
+    #[test]
+    fn a_clock_that_was_ahead_and_is_set_right_does_not_make_a_vehicle_unheard() {
+        let mut track = Track::new(state(t(600.0), 3.0), t(0.0));
+        track.observe(state(t(1.0), 4.0), t(1.0));
+        track.observe(state(t(1.1), 4.1), t(1.1));
+        assert!(track.state.position_ned_m.x == 4.1 && track.silent_s(t(1.1)) < 1e-6);
+        assert!(track.predict(t(1.1), 0.0).position_ned_m.x.is_finite());
+        // An ordinary late one is still no news.
+        track.observe(state(t(1.0), 9.0), t(1.2));
+        assert_eq!(track.state.position_ned_m.x, 4.1);
+    }
 }

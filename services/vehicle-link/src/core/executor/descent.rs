@@ -112,6 +112,10 @@ impl Executor {
         let problem = match goal {
             Goal::LandHere => None,
             Goal::Return => (!at_home).then_some("returning instead"),
+            // A clearance is for one place: in LAND elsewhere, by a fail-safe that is over, it permits nothing.
+            Goal::Land { point, .. } if step.distance_m(*point) > 3.0 * limits.landing_radius_m => {
+                Some("not over the landing place")
+            }
             Goal::Land { clearance, .. } => clearance_problem(clearance.as_ref(), step.now),
             Goal::Stay | Goal::Go { .. } | Goal::Follow { .. } => Some("there is something else to do"),
         };

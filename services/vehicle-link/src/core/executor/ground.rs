@@ -112,7 +112,7 @@ impl Executor {
         let keep_m = self.config.limits.separation_m_min;
         let near = self.neighbours.iter().find(|(_, track)| {
             let away_m = (track.predict(now, 0.0).position_ned_m - own.position_ned_m).xy().norm();
-            away_m < if track.parked() { self.config.limits.separation_parked_m } else { keep_m } && track.silent_s(now) < 30.0
+            away_m < if track.parked() { self.config.limits.separation_parked_m } else { keep_m } && track.unheard_s(now) < 30.0
         });
         near.map(|(vehicle, _)| format!("{vehicle} is too near to take off"))
     }

@@ -25,12 +25,14 @@ impl Executor {
     /// A plan came. The number decides: an older one is refused whatever it says.
     pub fn observe_plan(&mut self, plan: &DispatchPlan, now: Stamp) -> PlanAnswer {
         let seen = self.plan_generation();
-        // No validity is believed for ever, however wrong the clock that wrote it.
-        let latest = now.plus_secs_f64(self.config.fail_safe.validity_s_max);
+        // However wrong the clock that wrote it, or ours: nothing is believed for longer after it came than it was to hold after
+        // it was written, nor for ever.
+        let longest_s = self.config.fail_safe.validity_s_max;
+        let latest = |until: Stamp| now.plus_secs_f64(until.seconds_since(plan.stamp).min(longest_s)).min(until);
         let task = plan.task_for(&self.config.vehicle);
         let mut goal = task.map(Goal::from_task);
         if let Some(Goal::Land { clearance: Some(clearance), .. }) = &mut goal {
-            clearance.valid_until = clearance.valid_until.min(latest);
+            clearance.valid_until = latest(clearance.valid_until);
         }
         if plan.generation < seen {
             return PlanAnswer::RefusedOlder { seen };
@@ -43,8 +45,8 @@ impl Executor {
             self.note(Severity::Warning, format!("plan {} refused", plan.generation), problem.clone());
             return PlanAnswer::RefusedInvalid(problem);
         }
-        self.plan =
-            Some(PlanSeen { generation: plan.generation, valid_until: plan.valid_until.min(latest), assigned: goal.is_some() });
+        let valid_until = latest(plan.valid_until);
+        self.plan = Some(PlanSeen { generation: plan.generation, valid_until, assigned: goal.is_some() });
         if let Some(goal) = goal {
             let changed = |direct: &super::Direct| !direct.instead_of.as_ref().is_some_and(|old| old.is_same_as(&goal));
             if let Some(direct) = self.direct.take_if(|direct| changed(direct)) {

@@ -1,9 +1,9 @@
 //! Every row of the fail-safe table.
 
-use halcyon_model::{Activity, FlightMode, Task};
+use halcyon_model::{Activity, Assignment, DispatchPlan, FlightMode, Task};
 use nalgebra::Vector3;
 
-use super::world::{World, follow, land, survey};
+use super::world::{World, follow, id, land, survey};
 use crate::core::commands::Command;
 use crate::core::executor::{Output, PlanAnswer};
 
@@ -264,6 +264,29 @@ fn a_clearance_that_merely_lapses_and_a_plan_that_lapses_do_the_same() {
     assert!(world.copters[0].position.norm() < 0.5);
 }
 
+/// A companion computer without a clock of its own may start minutes behind the ground's.
+#[test]
+fn a_clock_that_is_behind_does_not_lengthen_a_plan_or_a_clearance() {
+    let ahead = |world: &World, generation, plan_s, clearance_s| {
+        let theirs = world.now.plus_secs_f64(40.0);
+        let task = land(40.0, 0.0, Some(theirs.plus_secs_f64(clearance_s)));
+        DispatchPlan {
+            stamp: theirs,
+            generation,
+            mission: None,
+            valid_until: theirs.plus_secs_f64(plan_s),
+            assignments: vec![Assignment { vehicle: id("v0"), task }],
+        }
+    };
+    for (plan_s, clearance_s) in [(5.0, 1.0), (1.0, 5.0)] {
+        let mut world = descending_to(2.5);
+        let (now, plan) = (world.now, ahead(&world, world.generation + 1, plan_s, clearance_s));
+        assert_eq!(world.executors[0].observe_plan(&plan, now), PlanAnswer::Accepted);
+        world.run(4.5, |_| {});
+        assert!(world.height(0) > 2.5, "plan {plan_s} s, clearance {clearance_s} s: {}", world.height(0));
+    }
+}
+
 #[test]
 fn in_land_mode_it_is_broken_off_above_the_commit_height_and_finished_below() {
     let mut world = descending_to(0.9);
@@ -274,6 +297,19 @@ fn in_land_mode_it_is_broken_off_above_the_commit_height_and_finished_below() {
     let mut world = descending_to(0.45);
     world.until(10.0, uncleared, |world| down(world, 0));
     assert!(world.executors[0].touchdown().is_some());
+}
+
+#[test]
+fn a_fail_safes_landing_elsewhere_is_not_finished_on_the_landing_places_clearance() {
+    let mut world = World::new(&[(0.0, 0.0)]);
+    world.airborne(0, Vector3::new(20.0, 0.0, -5.0));
+    world.run(1.0, cleared);
+    world.copters[0].estimator_ok = false;
+    world.until(20.0, cleared, |world| world.copters[0].mode == FlightMode::Land && world.height(0) < 4.0);
+    assert!(world.copters[0].position.x < 36.0, "it was still on the way: {}", world.copters[0].position);
+    world.copters[0].estimator_ok = true;
+    world.until(120.0, cleared, |world| down(world, 0));
+    assert!((world.copters[0].position - Vector3::new(40.0, 0.0, 0.0)).norm() < 1.0, "{}", world.copters[0].position);
 }
 
 #[test]
