@@ -1,7 +1,11 @@
 //! What `halcyon calibrate` and `halcyon match` do, without the command line: files in, files and a report out.
 
 mod calibrate;
+mod compare;
 mod matching;
+mod options;
 
 pub use calibrate::{CalibrateCliError, CalibrateReport, CameraReport, ViewReport, calibrate};
-pub use matching::{MatchCliError, MatchReport, match_pair};
+pub use compare::{Matched, THESIS_SIZES_PX, TimeAtSize, compare, times_by_size};
+pub use matching::{MatchCliError, MatchReport, TruthReport, match_pair};
+pub use options::{MatchOptions, OptionError};

@@ -1,26 +1,32 @@
 //! Pictures and disparity maps on disk, for the command line; the service itself touches no file.
 //!
-//! Decoders are lenient where we are not: a truncated JPEG decodes to a grey lower half with a remark on stderr. So the
-//! container is checked first, byte by byte, and only whole files reach a decoder.
+//! Decoders are lenient where we are not: a truncated JPEG decodes to a grey lower half with a remark on stderr. So every file is
+//! walked first, byte by byte, and only whole ones reach a decoder. JPEG, PNG and PNM are read: colour becomes luma (ITU-R
+//! BT.601), more than 8 bits are scaled by the rule of [`Grey`], and whatever else a file may be is an error that says so.
 
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use halcyon_model::Image;
 use halcyon_model::stereo::ImageError;
-use opencv::core::{MatTraitConst, MatTraitConstManual};
-use opencv::{imgcodecs, imgproc};
+
+use crate::core::disparity::pfm::PfmError;
 
 mod container;
+mod decode;
 mod glob;
+mod grey;
+mod pnm;
+mod truth;
 
 pub use container::PictureKind;
-use container::check;
+use container::Trouble;
 pub use glob::{GlobError, glob};
+pub use grey::{Grey, Samples};
+pub use truth::read_truth;
 
 /// Larger files are no pictures of a stereo rig.
 const FILE_BYTES_MAX: u64 = 512 << 20;
-/// A decoder allocates what the header says: refuse a header that says too much.
-const PIXELS_MAX: u64 = 128 << 20;
 
 /// Why a picture could not be read or a result not written.
 #[derive(Debug, thiserror::Error)]
@@ -44,18 +50,36 @@ pub enum FileError {
         source: std::io::Error,
     },
     /// Larger than any picture.
-    #[error("{} has {bytes} bytes, at most {FILE_BYTES_MAX} are read", path.display())]
+    #[error("{} has more than {FILE_BYTES_MAX} bytes, too many for a picture", path.display())]
     TooLarge {
         /// The file.
         path: PathBuf,
-        /// Its size.
-        bytes: u64,
     },
-    /// Neither JPEG nor PNG nor PNM, whatever its name says.
-    #[error("{} is not a JPEG, PNG, PGM or PPM picture", path.display())]
+    /// A device; reading it may never end.
+    #[error("{} is a device, not a file", path.display())]
+    Device {
+        /// The file.
+        path: PathBuf,
+    },
+    /// No bytes.
+    #[error("{} is empty", path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
+    /// No picture, whatever its name says.
+    #[error("{} is not a picture (JPEG, PNG, PBM, PGM and PPM are read)", path.display())]
     NotAPicture {
         /// The file.
         path: PathBuf,
+    },
+    /// Of a known format, or a sort of it, that is not read.
+    #[error("{} is a {format}, which is not read: convert it to a plain PNG", path.display())]
+    Unsupported {
+        /// The file.
+        path: PathBuf,
+        /// The format.
+        format: String,
     },
     /// Starts as a picture, but is not whole.
     #[error("{} is a damaged {kind}: {why}", path.display())]
@@ -67,13 +91,14 @@ pub enum FileError {
         /// What is wrong with it.
         why: String,
     },
-    /// More than eight bits a channel.
-    #[error("{} has {bits} bits a channel: convert it to 8", path.display())]
-    Depth {
+    /// Starts as a PFM.
+    #[error("{} is a damaged PFM", path.display())]
+    Pfm {
         /// The file.
         path: PathBuf,
-        /// Bits a channel.
-        bits: u32,
+        /// What is wrong with it.
+        #[source]
+        source: PfmError,
     },
     /// Sides out of range.
     #[error("{} is too large", path.display())]
@@ -94,26 +119,70 @@ pub enum FileError {
     },
 }
 
-/// Reads a picture as 8-bit grey; colour is converted with the usual weights (ITU-R BT.601). EXIF orientation is not applied:
-/// a calibration belongs to the sensor's own rows and columns.
+/// Reads a picture as 8-bit grey. EXIF orientation is not applied: a calibration belongs to the sensor's own rows and columns.
 ///
 /// # Errors
-/// [`FileError`] for a file that is missing, too large, not a picture, damaged, or of more than 8 bits.
+/// [`FileError`] for a file that is missing, too large, damaged, not a picture, or of a sort that is not read.
 pub fn read_picture(path: &Path) -> Result<Image, FileError> {
+    let grey = read_grey(path)?;
+    let white = grey.white();
+    into_image(path, grey, white)
+}
+
+/// Reads both pictures of a pair as 8-bit grey; of 16-bit pictures, both on the same scale.
+///
+/// # Errors
+/// As [`read_picture`].
+pub fn read_pair(left: &Path, right: &Path) -> Result<(Image, Image), FileError> {
+    let (left_grey, right_grey) = (read_grey(left)?, read_grey(right)?);
+    let is_deep = |grey: &Grey| matches!(grey.samples, Samples::Sixteen(_));
+    let (mut left_white, mut right_white) = (left_grey.white(), right_grey.white());
+    if is_deep(&left_grey) && is_deep(&right_grey) {
+        (left_white, right_white) = (left_white.max(right_white), left_white.max(right_white));
+    }
+    Ok((into_image(left, left_grey, left_white)?, into_image(right, right_grey, right_white)?))
+}
+
+/// Reads a picture's grey levels as they are, of 8 or of 16 bits.
+///
+/// # Errors
+/// As [`read_picture`].
+pub fn read_grey(path: &Path) -> Result<Grey, FileError> {
     decode_picture(path, &read_bytes(path)?)
+}
+
+fn into_image(path: &Path, grey: Grey, white: u16) -> Result<Image, FileError> {
+    grey.into_image(white).map_err(|source| FileError::Size { path: path.into(), source })
 }
 
 /// All bytes of a file of sane size.
 pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>, FileError> {
     let read = |source| FileError::Read { path: path.into(), source };
-    let metadata = std::fs::metadata(path).map_err(read)?;
-    if metadata.is_dir() {
+    let kind = std::fs::metadata(path).map_err(read)?.file_type();
+    if kind.is_dir() {
         return Err(read(std::io::Error::from(std::io::ErrorKind::IsADirectory)));
     }
-    if metadata.len() > FILE_BYTES_MAX {
-        return Err(FileError::TooLarge { path: path.into(), bytes: metadata.len() });
+    if is_device(kind) {
+        return Err(FileError::Device { path: path.into() });
     }
-    std::fs::read(path).map_err(read)
+    let mut bytes = Vec::new();
+    std::fs::File::open(path).map_err(read)?.take(FILE_BYTES_MAX + 1).read_to_end(&mut bytes).map_err(read)?;
+    match bytes.len() as u64 {
+        0 => Err(FileError::Empty { path: path.into() }),
+        length if length > FILE_BYTES_MAX => Err(FileError::TooLarge { path: path.into() }),
+        _ => Ok(bytes),
+    }
+}
+
+#[cfg(unix)]
+fn is_device(kind: std::fs::FileType) -> bool {
+    use std::os::unix::fs::FileTypeExt as _;
+    kind.is_char_device() || kind.is_block_device()
+}
+
+#[cfg(not(unix))]
+fn is_device(_: std::fs::FileType) -> bool {
+    false
 }
 
 /// Writes a result as a whole: into a file beside it first, so that a full disk leaves no half result under the name.
@@ -138,38 +207,17 @@ pub(crate) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     done.map_err(write)
 }
 
-fn decode_picture(path: &Path, bytes: &[u8]) -> Result<Image, FileError> {
-    let damaged = |kind: PictureKind, why: String| FileError::Damaged { path: path.into(), kind: kind.name(), why };
-    let kind = PictureKind::of(bytes).ok_or_else(|| FileError::NotAPicture { path: path.into() })?;
-    let header = check(kind, bytes).map_err(|why| damaged(kind, why))?;
-    if header.bits > 8 {
-        return Err(FileError::Depth { path: path.into(), bits: header.bits });
-    }
-    if u64::from(header.width_px) * u64::from(header.height_px) > PIXELS_MAX {
-        return Err(damaged(kind, format!("its header claims {} x {} px", header.width_px, header.height_px)));
-    }
-    let grey = decode_grey(bytes).map_err(|error| damaged(kind, error.message))?;
-    let Some((width_px, height_px, pixels)) = grey else { return Err(damaged(kind, "it does not decode".into())) };
-    Image::new(width_px, height_px, pixels.into()).map_err(|source| FileError::Size { path: path.into(), source })
-}
-
-/// Width, height and grey pixels; `None` where the decoder gives up.
-fn decode_grey(bytes: &[u8]) -> opencv::Result<Option<(u32, u32, Vec<u8>)>> {
-    let encoded = opencv::core::Mat::from_slice(bytes)?;
-    let decoded = imgcodecs::imdecode(&encoded, imgcodecs::IMREAD_UNCHANGED)?;
-    if decoded.empty() || decoded.depth() != opencv::core::CV_8U {
-        return Ok(None);
-    }
-    let code = match decoded.channels() {
-        1 => None,
-        3 => Some(imgproc::COLOR_BGR2GRAY),
-        4 => Some(imgproc::COLOR_BGRA2GRAY),
-        _ => return Ok(None),
+fn decode_picture(path: &Path, bytes: &[u8]) -> Result<Grey, FileError> {
+    let Some(kind) = PictureKind::of(bytes) else {
+        return Err(match container::foreign(bytes) {
+            Some(format) => FileError::Unsupported { path: path.into(), format: format.into() },
+            None => FileError::NotAPicture { path: path.into() },
+        });
     };
-    let mut grey = opencv::core::Mat::default();
-    match code {
-        Some(code) => imgproc::cvt_color_def(&decoded, &mut grey, code)?,
-        None => grey = decoded,
-    }
-    Ok(Some((grey.cols() as u32, grey.rows() as u32, grey.data_bytes()?.to_vec())))
+    let damaged = |why| FileError::Damaged { path: path.into(), kind: kind.name(), why };
+    decode::decode(kind, bytes).map_err(|trouble| match trouble {
+        Trouble::Truncated => damaged("it is truncated".into()),
+        Trouble::Damaged(why) => damaged(why),
+        Trouble::Unsupported(sort) => FileError::Unsupported { path: path.into(), format: format!("{} {sort}", kind.name()) },
+    })
 }

@@ -10,9 +10,13 @@
 mod support;
 
 use halcyon_model::Image;
+use halcyon_reconstruction::cli::{compare, times_by_size};
 use halcyon_reconstruction::core::disparity::Disparity;
-use halcyon_reconstruction::core::matcher::{DisparityRange, Engine, match_images};
+use halcyon_reconstruction::core::matcher::{DisparityRange, Engine, StudyMethod, match_images};
 use halcyon_reconstruction::files::read_picture;
+use opencv::core::{Mat, Rect, Size};
+use opencv::imgproc::{INTER_AREA, resize};
+use opencv::prelude::*;
 use support::samples;
 
 struct Aloe {
@@ -87,4 +91,85 @@ fn semi_global_matching() {
 #[test]
 fn semi_global_matching_along_three_paths() {
     check("sgbm-3way", 0.05, 0.8);
+}
+
+/// A third of the size in each direction, so that all methods run in seconds: every third pixel of the truth, a third of it.
+fn small_aloe() -> (Image, Image, Disparity) {
+    let aloe = aloe();
+    let (width, height) = (aloe.left.width_px() / 3, aloe.left.height_px() / 3);
+    let shrink = |image: &Image| {
+        let (from, mut to) = (Mat::from_slice(image.pixels()).unwrap(), Mat::default());
+        let from = from.reshape(1, image.height_px() as i32).unwrap();
+        // Whole blocks of 3 × 3, so that pixel centres map to pixel centres.
+        let whole = Mat::roi(&from, Rect::new(0, 0, 3 * width as i32, 3 * height as i32)).unwrap();
+        resize(&whole, &mut to, Size::new(width as i32, height as i32), 0.0, 0.0, INTER_AREA).unwrap();
+        Image::new(width, height, to.data_bytes().unwrap().to_vec().into()).unwrap()
+    };
+    let level = |x: u32, y: u32| aloe.truth.pixels()[((3 * y + 1) * aloe.truth.width_px() + 3 * x + 1) as usize];
+    let values_px = (0..width * height).map(|i| match level(i % width, i / width) {
+        0 => f32::NAN,
+        level => f32::from(level) / 3.0,
+    });
+    let truth = Disparity { width_px: width, height_px: height, values_px: values_px.collect() };
+    (shrink(&aloe.left), shrink(&aloe.right), truth)
+}
+
+/// Engine, least density, largest share of matched pixels off by more than 1 and 2 px, all in percent: what was measured, with
+/// a margin of 2 for density and of a sixth for the others.
+const LIMITS: [(&str, f64, f64, f64); 17] = [
+    ("bm", 71.7, 6.2, 4.5),
+    ("sgbm", 84.4, 7.9, 6.0),
+    ("sgbm-3way", 84.5, 6.8, 5.4),
+    ("sgbm-hh4", 84.7, 7.2, 5.6),
+    ("sgbm-hh", 84.3, 6.8, 5.2),
+    ("wta-sad", 81.2, 10.5, 6.7),
+    ("wta-ssd", 80.1, 12.1, 7.8),
+    ("wta-ncc", 80.4, 11.2, 7.7),
+    ("wta-rank", 81.7, 6.8, 4.4),
+    ("wta-census", 82.9, 6.9, 4.5),
+    ("wta-mi", 82.3, 8.3, 5.3),
+    ("sgm-sad", 84.4, 8.5, 5.3),
+    ("sgm-ssd", 83.6, 9.6, 6.4),
+    ("sgm-ncc", 84.1, 6.7, 5.0),
+    ("sgm-rank", 84.8, 5.3, 3.9),
+    ("sgm-census", 85.0, 5.8, 4.3),
+    ("sgm-mi", 84.7, 6.2, 4.1),
+];
+
+/// Density and bad pixels of every engine. The truth knows occluded pixels as well, which no left-right check lets through, so
+/// no density reaches 100 %.
+#[test]
+fn every_engine_side_by_side() {
+    let (left, right, truth) = small_aloe();
+    let engines: Vec<Engine> = Engine::ALL.into_iter().chain(StudyMethod::ALL.map(Engine::Study)).collect();
+    let range = DisparityRange { min_px: 0, max_px: 75 };
+    println!("| engine | density % | bad1 % | bad2 % | mean error px | points | CPU ms |");
+    let all = compare(&left, &right, range, &engines).unwrap();
+    assert_eq!(all.len(), LIMITS.len());
+    for (matched, (name, density_min, bad1_max, bad2_max)) in all.iter().zip(LIMITS) {
+        assert_eq!(matched.engine.name(), name);
+        let score = matched.score(&truth).unwrap();
+        let (density, bad1, bad2) = (100.0 * score.density, 100.0 * score.bad1, 100.0 * score.bad2);
+        println!(
+            "| {name} | {density:.1} | {bad1:.2} | {bad2:.2} | {:.2} | {} | {:.0} |",
+            score.mean_error_px,
+            matched.points,
+            matched.cpu_ms.unwrap_or(f64::NAN)
+        );
+        assert!(density >= density_min && bad1 <= bad1_max && bad2 <= bad2_max, "{name}: {score:?}");
+    }
+}
+
+/// Figure 5-17's numbers for the lab: every size and engine once, larger pictures with more points.
+#[test]
+fn times_by_size_cover_the_same_depths() {
+    let (left, right, _) = small_aloe();
+    let range = DisparityRange { min_px: 0, max_px: 75 };
+    let engines = [Engine::Bm, "sgbm".parse().unwrap()];
+    let rows = times_by_size(&left, &right, range, &[(213, 185), (427, 370)], &engines, 1).unwrap();
+    let shape: Vec<_> = rows.iter().map(|row| (row.width_px, row.disparities, row.engine)).collect();
+    assert_eq!(shape, [(213, 48, engines[0]), (213, 48, engines[1]), (427, 80, engines[0]), (427, 80, engines[1])]);
+    assert!(rows.iter().all(|row| row.wall_ms > 0.0));
+    assert!(rows[2].points > 3 * rows[0].points && rows[3].points > 3 * rows[1].points, "{rows:?}");
+    assert!(times_by_size(&left, &right, range, &[(0, 5)], &engines, 1).is_err());
 }

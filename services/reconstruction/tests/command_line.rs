@@ -11,10 +11,10 @@ mod support;
 
 use std::path::Path;
 
-use halcyon_model::Image;
-use halcyon_reconstruction::cli::{self, CalibrateCliError, MatchCliError};
+use halcyon_reconstruction::cli::{self, CalibrateCliError, MatchCliError, MatchOptions};
 use halcyon_reconstruction::core::calibrate::CalibrateError;
-use halcyon_reconstruction::core::disparity::pfm;
+use halcyon_reconstruction::core::disparity::{Disparity, pfm};
+use halcyon_reconstruction::core::matcher::{Engine, StudyMethod};
 use halcyon_reconstruction::files::{FileError, read_picture};
 use support::samples;
 
@@ -122,11 +122,12 @@ fn shifted_pair(folder: &Path, shift: usize) -> (String, String) {
 fn match_finds_a_known_shift_with_every_engine_and_both_formats() {
     let folder = tempfile::tempdir().unwrap();
     let (left, right) = shifted_pair(folder.path(), 20);
-    for engine in ["bm", "sgbm", "sgbm-3way", "sgbm-hh"] {
+    for engine in Engine::ALL.into_iter().chain(StudyMethod::ALL.map(Engine::Study)) {
+        let (engine, disparities) = (engine.name(), if matches!(engine, Engine::Study(_)) { 22 } else { 32 });
         let out = folder.path().join("d.pfm");
         // 21 is no multiple of 16: rounded up, not refused.
-        let report = cli::match_pair(left.as_ref(), right.as_ref(), 21.0, engine, &out).unwrap();
-        assert_eq!((report.engine, report.width_px, report.height_px, report.disparities), (engine, 320, 120, 32));
+        let report = cli::match_pair(left.as_ref(), right.as_ref(), 21.0, engine, &MatchOptions::default(), &out).unwrap();
+        assert_eq!((report.engine, report.width_px, report.height_px, report.disparities), (engine, 320, 120, disparities));
         let map = pfm::decode(&std::fs::read(&out).unwrap()).unwrap();
         assert!((map.density() - report.density).abs() < 1e-12);
         let right_ones = map.values_px.iter().filter(|value| (**value - 20.0).abs() < 0.5).count();
@@ -136,7 +137,7 @@ fn match_finds_a_known_shift_with_every_engine_and_both_formats() {
         assert!((0..120).all(|row| map.values_px[row * 320..][..19].iter().all(|value| value.is_nan() || *value < 20.0)));
     }
     let png = folder.path().join("d.png");
-    cli::match_pair(left.as_ref(), right.as_ref(), 32.0, "sgbm", &png).unwrap();
+    cli::match_pair(left.as_ref(), right.as_ref(), 32.0, "sgbm", &MatchOptions::default(), &png).unwrap();
     assert_eq!(read_picture(&png).map(|image| (image.width_px(), image.height_px())).unwrap(), (320, 120));
 }
 
@@ -147,7 +148,7 @@ fn bad_input_to_match_is_named() {
     let small = write_pgm(folder.path(), "small.pgm", 4, 4, &[7; 16]);
     let out = folder.path().join("d.pfm");
     let run = |left: &str, right: &str, max: f64, engine: &str, out: &Path| {
-        cli::match_pair(left.as_ref(), right.as_ref(), max, engine, out)
+        cli::match_pair(left.as_ref(), right.as_ref(), max, engine, &MatchOptions::default(), out)
     };
 
     for max in [0.0, -16.0, f64::NAN, f64::INFINITY, 320.0, 1e12] {
@@ -174,33 +175,39 @@ fn bad_input_to_match_is_named() {
 }
 
 #[test]
-fn pictures_that_are_none_are_named() {
+fn match_counts_bad_pixels_against_a_truth() {
     let folder = tempfile::tempdir().unwrap();
-    let write = |name: &str, bytes: &[u8]| {
-        let path = folder.path().join(name);
-        std::fs::write(&path, bytes).unwrap();
-        path
+    let (left, right) = shifted_pair(folder.path(), 20);
+    let out = folder.path().join("d.pfm");
+    let run = |truth: &str, scale: f32| {
+        let options = MatchOptions { truth: Some(truth.into()), truth_scale_px: scale, ..MatchOptions::default() };
+        cli::match_pair(left.as_ref(), right.as_ref(), 32.0, "wta-census", &options, &out)
     };
-    let jpeg = std::fs::read(samples().join("left01.jpg")).unwrap();
-    let png = std::fs::read(samples().join("aloeGT.png")).unwrap();
+    // 20 px at half a pixel a grey level, unknown in the left half.
+    let levels: Vec<u8> = (0..320 * 120).map(|i| if i % 320 < 160 { 0 } else { 40 }).collect();
+    let picture = write_pgm(folder.path(), "truth.pgm", 320, 120, &levels);
+    let truth = run(&picture, 0.5).unwrap().truth.unwrap();
+    assert!(truth.known == 160 * 120 && truth.density > 0.9 && truth.bad1 < 0.01 && truth.mean_error_px < 0.05, "{truth:?}");
+    let wrong = run(&picture, 0.6).unwrap().truth.unwrap();
+    assert!(wrong.bad1 > 0.99 && wrong.bad2 > 0.99 && (wrong.mean_error_px - 4.0).abs() < 0.1, "{wrong:?}");
 
-    let text = read_picture(&write("text.jpg", b"this is no picture\n"));
-    assert!(matches!(text, Err(FileError::NotAPicture { .. })), "{text:?}");
-    assert!(matches!(read_picture(&write("empty.png", b"")), Err(FileError::NotAPicture { .. })));
-    let damaged = |read: Result<Image, FileError>| assert!(matches!(read, Err(FileError::Damaged { .. })), "{read:?}");
-    for cut in [3, 20, 200, jpeg.len() / 2, jpeg.len() - 1] {
-        damaged(read_picture(&write("cut.jpg", &jpeg[..cut])));
+    let numbers = folder.path().join("truth.pfm");
+    let map = Disparity { width_px: 320, height_px: 120, values_px: vec![20.0; 320 * 120] };
+    std::fs::write(&numbers, pfm::encode(&map)).unwrap();
+    let report = run(&numbers.to_string_lossy(), 1.0).unwrap();
+    assert!(report.truth.unwrap().bad1 < 0.01);
+    assert_eq!(report.points as f64 / (320.0 * 120.0), report.density);
+    let json = serde_json::to_value(&report).unwrap();
+    for key in ["known", "density", "bad1", "bad2", "mean_error_px"] {
+        assert!(json["truth"][key].is_number(), "{key}");
     }
-    for cut in [8, 30, png.len() / 2, png.len() - 5] {
-        damaged(read_picture(&write("cut.png", &png[..cut])));
+    for key in ["width_px", "height_px", "disparities", "window_px", "points", "density", "wall_ms"] {
+        assert!(json[key].is_number(), "{key}");
     }
-    let mut flipped = png.clone();
-    flipped[png.len() / 2] ^= 0x40;
-    damaged(read_picture(&write("flipped.png", &flipped)));
-    damaged(read_picture(&write("short.pgm", b"P5 640 480 255\nabc")));
-    let deep = read_picture(&write("deep.pgm", &[b"P5 2 1 65535\n".as_slice(), &[0, 1, 2, 3]].concat()));
-    assert!(matches!(deep, Err(FileError::Depth { bits: 16, .. })), "{deep:?}");
-    // Colour is converted, and a picture with bytes after its end is still whole.
-    assert_eq!(read_picture(&samples().join("aloeL.jpg")).unwrap().width_px(), 1282);
-    assert!(read_picture(&write("tail.jpg", &[jpeg.as_slice(), b"tail"].concat())).is_ok());
+
+    let small = write_pgm(folder.path(), "small.pgm", 4, 4, &[7; 16]);
+    assert!(matches!(run(&small, 1.0), Err(MatchCliError::Truth(_))));
+    std::fs::write(&numbers, b"Pf 320 120 -1\nabc").unwrap();
+    assert!(matches!(run(&numbers.to_string_lossy(), 1.0), Err(MatchCliError::File(FileError::Pfm { .. }))));
+    assert!(matches!(run(&picture, f32::NAN), Err(MatchCliError::Option(_))));
 }

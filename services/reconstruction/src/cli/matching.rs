@@ -5,9 +5,12 @@ use std::time::Instant;
 
 use serde::Serialize;
 
+use super::options::{MatchOptions, OptionError};
+use crate::core::disparity::Disparity;
+use crate::core::disparity::score::{Score, SizeError, score};
 use crate::core::disparity::{colour, pfm};
 use crate::core::matcher::{DisparityRange, Engine, MatchError, UnknownEngine, match_images};
-use crate::files::{FileError, read_picture, write_bytes};
+use crate::files::{FileError, read_pair, read_truth, write_bytes};
 
 /// Why there is no disparity map.
 #[derive(Debug, thiserror::Error)]
@@ -15,6 +18,9 @@ pub enum MatchCliError {
     /// `--engine`
     #[error(transparent)]
     Engine(#[from] UnknownEngine),
+    /// Another option.
+    #[error(transparent)]
+    Option(#[from] OptionError),
     /// `--max-disparity`
     #[error("the largest disparity must be at least 1 and below the pictures' width, {width_px} px, not {max_disparity_px}")]
     MaxDisparity {
@@ -29,6 +35,9 @@ pub enum MatchCliError {
     /// The pictures themselves.
     #[error(transparent)]
     Match(#[from] MatchError),
+    /// `--truth`
+    #[error(transparent)]
+    Truth(#[from] SizeError),
 }
 
 /// The result, as `--json` prints it.
@@ -42,12 +51,41 @@ pub struct MatchReport {
     pub height_px: u32,
     /// Disparities searched, after rounding up to what the engine takes.
     pub disparities: u32,
+    /// Side of the window, pixels.
+    pub window_px: u32,
+    /// Pixels with a match: each becomes a point in space (fig. 4-24).
+    pub points: usize,
     /// Share of the pixels with a match, 0 to 1.
     pub density: f64,
     /// Processor time of matching, all threads, milliseconds; absent where the system does not tell.
     pub cpu_ms: Option<f64>,
     /// Time of matching, milliseconds.
     pub wall_ms: f64,
+    /// The comparison with the truth, where one was given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub truth: Option<TruthReport>,
+}
+
+/// A disparity map against its truth, as `--json` prints it; shares are 0 to 1, and null where nothing was matched.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct TruthReport {
+    /// Pixels whose true disparity is known.
+    pub known: usize,
+    /// Share of these that were matched.
+    pub density: f64,
+    /// Share of the matched ones that are off by more than 1 px.
+    pub bad1: f64,
+    /// Share of the matched ones that are off by more than 2 px.
+    pub bad2: f64,
+    /// Mean absolute error of the matched ones, pixels.
+    pub mean_error_px: f64,
+}
+
+impl From<Score> for TruthReport {
+    fn from(score: Score) -> Self {
+        let Score { known, density, bad1, bad2, mean_error_px } = score;
+        Self { known, density, bad1, bad2, mean_error_px }
+    }
 }
 
 /// Matches a rectified pair and writes the disparity of the left picture: PFM (NaN where there is no match) or colour PNG,
@@ -60,44 +98,56 @@ pub fn match_pair(
     right: &Path,
     max_disparity_px: f64,
     engine: &str,
+    options: &MatchOptions,
     out: &Path,
 ) -> Result<MatchReport, MatchCliError> {
     let engine: Engine = engine.parse()?;
+    let mut matcher = options.matcher(engine)?;
     let extension = out.extension().map(std::ffi::OsStr::to_ascii_lowercase);
     let as_png = match extension.as_deref().and_then(std::ffi::OsStr::to_str) {
         Some("pfm") => false,
         Some("png") => true,
         _ => return Err(FileError::Extension { path: out.into(), expected: ".pfm or .png" }.into()),
     };
-    let (left, right) = (read_picture(left)?, read_picture(right)?);
+    let (left, right) = read_pair(left, right)?;
     let width_px = left.width_px();
     // Negated so that NaN is refused, too.
     if !(max_disparity_px >= 1.0 && max_disparity_px < f64::from(width_px)) {
         return Err(MatchCliError::MaxDisparity { max_disparity_px, width_px });
     }
+    let truth = options.truth.as_deref().map(|path| read_truth(path, options.truth_scale_px)).transpose()?;
+    if let Some(truth) = &truth {
+        // Before the work, not after it.
+        let mut blank = Disparity::default();
+        blank.reset(width_px, left.height_px());
+        score(&blank, truth)?;
+    }
     // Rounded up where the sum is no multiple of 16; still below the width, which the check above leaves room for.
     let range = DisparityRange { min_px: 0, max_px: (max_disparity_px.ceil() as u32).min(width_px - 1) };
-    let mut matcher = engine.matcher(engine.block_px_default());
     let (wall, cpu_s) = (Instant::now(), cpu_s());
     let disparity = match_images(matcher.as_mut(), &left, &right, range)?;
     let wall_ms = wall.elapsed().as_secs_f64() * 1e3;
     let cpu_ms = cpu_s.zip(self::cpu_s()).map(|(before_s, after_s)| (after_s - before_s) * 1e3);
+    let truth = truth.map(|truth| score(&disparity, &truth)).transpose()?.map(TruthReport::from);
     let bytes = if as_png { colour::encode_png(&disparity).map_err(MatchError::from)? } else { pfm::encode(&disparity) };
     write_bytes(out, &bytes)?;
     Ok(MatchReport {
         engine: engine.name(),
         width_px,
         height_px: disparity.height_px,
-        disparities: range.count(),
+        disparities: engine.disparities(range),
+        window_px: options.window_px(engine),
+        points: disparity.matched(),
         density: disparity.density(),
         cpu_ms,
         wall_ms,
+        truth,
     })
 }
 
 /// Processor time of this process so far, all threads, seconds, from Linux's `/proc` (in hundredths: `USER_HZ` is 100 on every
 /// architecture that Linux and we run on).
-fn cpu_s() -> Option<f64> {
+pub(super) fn cpu_s() -> Option<f64> {
     let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
     // The name of the program, in brackets, may contain anything; numbers follow the last bracket.
     let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();

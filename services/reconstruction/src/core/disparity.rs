@@ -2,6 +2,7 @@
 
 pub mod colour;
 pub mod pfm;
+pub mod score;
 
 /// Left x minus right x for each pixel of the left rectified picture, row-major, pixels; NaN where there is no match.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -15,11 +16,16 @@ pub struct Disparity {
 }
 
 impl Disparity {
+    /// How many pixels have a match.
+    #[must_use]
+    pub fn matched(&self) -> usize {
+        self.values_px.iter().filter(|value| value.is_finite()).count()
+    }
+
     /// Share of the pixels with a match, 0 to 1.
     #[must_use]
     pub fn density(&self) -> f64 {
-        let matched = self.values_px.iter().filter(|value| value.is_finite()).count();
-        if self.values_px.is_empty() { 0.0 } else { matched as f64 / self.values_px.len() as f64 }
+        if self.values_px.is_empty() { 0.0 } else { self.matched() as f64 / self.values_px.len() as f64 }
     }
 
     /// Takes a new size; every pixel becomes NaN. Allocates only where it grows.

@@ -1,17 +1,20 @@
 //! Dense matching: engines behind one trait.
 
 mod block;
+mod method;
 mod sgbm;
 
 use std::str::FromStr;
 
 pub use block::BlockMatcher;
 use halcyon_model::Image;
+pub use method::StudyMethod;
 use opencv::core::{self as cvcore, BORDER_REPLICATE, Mat, MatTraitConst, MatTraitConstManual, Rect};
 pub use sgbm::{SemiGlobalMatcher, SgbmMode};
 
 use super::cv;
 use super::disparity::Disparity;
+use super::study;
 
 /// Which disparities to search: `min_px ..= max_px`, whole pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -68,6 +71,19 @@ pub enum MatchError {
         /// Height.
         height_px: u32,
     },
+    /// A setting of the reference matcher.
+    #[error("{0}")]
+    Settings(String),
+    /// The reference matcher holds all costs at once.
+    #[error(
+        "the reference matcher would need {needed_mib} MiB for its costs and takes at most {most_mib}: shrink the pictures or search fewer disparities"
+    )]
+    Memory {
+        /// What it would need.
+        needed_mib: u64,
+        /// What it takes.
+        most_mib: u64,
+    },
     /// OpenCV failed.
     #[error("OpenCV failed while matching")]
     OpenCv(#[from] opencv::Error),
@@ -108,12 +124,19 @@ pub enum Engine {
     Bm,
     /// OpenCV's semi-global matching (Hirschmüller 2008, thesis 4-16).
     Sgbm(SgbmMode),
+    /// The plain reference matcher, for study: slow, and holds all costs in memory.
+    Study(StudyMethod),
 }
 
 impl Engine {
-    /// Every engine that can be asked for.
-    pub const ALL: [Self; 4] =
-        [Self::Bm, Self::Sgbm(SgbmMode::FivePaths), Self::Sgbm(SgbmMode::ThreePaths), Self::Sgbm(SgbmMode::EightPaths)];
+    /// Every engine for work. Those for study are [`StudyMethod::ALL`].
+    pub const ALL: [Self; 5] = [
+        Self::Bm,
+        Self::Sgbm(SgbmMode::FivePaths),
+        Self::Sgbm(SgbmMode::ThreePaths),
+        Self::Sgbm(SgbmMode::FourPaths),
+        Self::Sgbm(SgbmMode::EightPaths),
+    ];
 
     /// As in configuration and on the command line.
     #[must_use]
@@ -122,7 +145,9 @@ impl Engine {
             Self::Bm => "bm",
             Self::Sgbm(SgbmMode::FivePaths) => "sgbm",
             Self::Sgbm(SgbmMode::ThreePaths) => "sgbm-3way",
+            Self::Sgbm(SgbmMode::FourPaths) => "sgbm-hh4",
             Self::Sgbm(SgbmMode::EightPaths) => "sgbm-hh",
+            Self::Study(method) => method.name(),
         }
     }
 
@@ -132,6 +157,7 @@ impl Engine {
         match self {
             Self::Bm => Box::new(BlockMatcher::new(block_px)),
             Self::Sgbm(mode) => Box::new(SemiGlobalMatcher::new(mode, block_px)),
+            Self::Study(method) => Box::new(study::ReferenceMatcher::new(study::Settings::new(method, block_px))),
         }
     }
 
@@ -142,13 +168,25 @@ impl Engine {
         match self {
             Self::Bm => 15,
             Self::Sgbm(_) => 5,
+            Self::Study(method) => method.window_px_default(),
+        }
+    }
+
+    /// How many disparities the engine searches for a range: OpenCV's in multiples of 16.
+    #[must_use]
+    pub fn disparities(self, range: DisparityRange) -> u32 {
+        match self {
+            Self::Bm | Self::Sgbm(_) => range.count(),
+            Self::Study(_) => range.max_px.saturating_sub(range.min_px) + 1,
         }
     }
 }
 
 /// No engine of that name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("no matching engine is called {0:?}: there are bm, sgbm, sgbm-3way and sgbm-hh")]
+#[error(
+    "no matching engine is called {0:?}: there are bm, sgbm, sgbm-3way, sgbm-hh4, sgbm-hh and, for study, wta- or sgm- with sad, ssd, ncc, rank, census or mi"
+)]
 pub struct UnknownEngine(String);
 
 impl FromStr for Engine {
@@ -156,7 +194,12 @@ impl FromStr for Engine {
 
     fn from_str(text: &str) -> Result<Self, UnknownEngine> {
         // Bounded: the text may be anything.
-        Self::ALL.into_iter().find(|engine| engine.name() == text).ok_or_else(|| UnknownEngine(text.chars().take(40).collect()))
+        let study = StudyMethod::ALL.into_iter().map(Self::Study);
+        Self::ALL
+            .into_iter()
+            .chain(study)
+            .find(|engine| engine.name() == text)
+            .ok_or_else(|| UnknownEngine(text.chars().take(40).collect()))
     }
 }
 
@@ -202,7 +245,7 @@ impl Padded {
 }
 
 /// Refuses what OpenCV would abort on.
-fn check(left: &Mat, right: &Mat, range: DisparityRange, block_px: u32) -> Result<(), MatchError> {
+pub(super) fn check(left: &Mat, right: &Mat, range: DisparityRange, block_px: u32) -> Result<(), MatchError> {
     let ((left_width_px, left_height_px), (right_width_px, right_height_px)) = (cv::size_px(left), cv::size_px(right));
     if (left_width_px, left_height_px) != (right_width_px, right_height_px) {
         return Err(MatchError::Sizes { left_width_px, left_height_px, right_width_px, right_height_px });
@@ -223,11 +266,15 @@ mod tests {
 
     #[test]
     fn names_go_there_and_back() {
-        for engine in Engine::ALL {
+        for engine in Engine::ALL.into_iter().chain(StudyMethod::ALL.map(Engine::Study)) {
             assert_eq!(engine.name().parse(), Ok(engine));
             assert_eq!(engine.matcher(engine.block_px_default()).name(), engine.name());
         }
         assert!("elas".parse::<Engine>().is_err());
+        // In configurations since the first version.
+        for name in ["bm", "sgbm", "sgbm-3way", "sgbm-hh"] {
+            assert!(name.parse::<Engine>().is_ok());
+        }
     }
 
     #[test]

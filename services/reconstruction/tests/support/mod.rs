@@ -2,6 +2,7 @@
 
 #![allow(dead_code, reason = "each test uses its part")]
 
+pub(crate) mod png;
 pub(crate) mod scene;
 
 use std::path::PathBuf;

@@ -12,6 +12,8 @@ use crate::core::disparity::Disparity;
 pub enum SgbmMode {
     /// Three: threaded, least memory.
     ThreePaths,
+    /// Four, along rows and columns, in two passes.
+    FourPaths,
     /// Five, in one pass over the picture.
     FivePaths,
     /// Eight, in two passes: best and slowest.
@@ -22,6 +24,7 @@ impl SgbmMode {
     fn flag(self) -> i32 {
         match self {
             Self::ThreePaths => calib3d::StereoSGBM_MODE_SGBM_3WAY,
+            Self::FourPaths => calib3d::StereoSGBM_MODE_HH4,
             Self::FivePaths => calib3d::StereoSGBM_MODE_SGBM,
             Self::EightPaths => calib3d::StereoSGBM_MODE_HH,
         }
