@@ -3,5 +3,8 @@
 mod calibrate;
 mod matching;
 
-pub use calibrate::{CalibrateCliError, CalibrateReport, CameraReport, ViewReport, calibrate};
+pub use calibrate::{
+    CalibrateCliError, CalibrateReport, CalibrateRequest, CameraReport, CoverageReport, DepthReport, ErrorByViewsReport, ViewReport,
+    calibrate, convert_rig,
+};
 pub use matching::{MatchCliError, MatchReport, match_pair};
