@@ -127,9 +127,10 @@ mod tests {
     const RIGHT: &str = "image_width: 640\nimage_height: 480\ncamera_name: narrow_stereo/right\ncamera_matrix:\n  rows: 3\n  cols: 3\n  data: [500.25, 0.     , 320.5,\n           0.     , 501.5, 240.25,\n           0.     ,   0.     ,   1.     ]\ndistortion_model: plumb_bob\ndistortion_coefficients:\n  rows: 1\n  cols: 5\n  data: [-0.363528, 0.095, 0.000256, 0.000331, 0.000000]\nrectification_matrix:\n  rows: 3\n  cols: 3\n  data: [ 0.8, 0. , 0.6,\n         0. , 1. , 0. ,\n         -0.6, 0. , 0.8]\nprojection_matrix:\n  rows: 3\n  cols: 4\n  data: [400., 0., 300., -36.8,\n         0., 400., 220., 0.,\n         0., 0., 1., 0.]\n";
 
     fn left() -> String {
-        RIGHT
-            .replace("-36.8", "0.")
-            .replace("[ 0.8, 0. , 0.6,\n         0. , 1. , 0. ,\n         -0.6, 0. , 0.8]", "[1., 0., 0., 0., 1., 0., 0., 0., 1.]")
+        RIGHT.replace("-36.8", "0.").replace(
+            "[ 0.8, 0. , 0.6,\n         0. , 1. , 0. ,\n         -0.6, 0. , 0.8]",
+            "[1., 0., 0., 0., 1., 0., 0., 0., 1.]",
+        )
     }
 
     /// By hand: R₂ᵀ turns by atan(0.6/0.8) about y; the baseline is 36.8 / 400 = 0.092 m; T = R₂ᵀ (−0.092, 0, 0).
@@ -159,12 +160,28 @@ mod tests {
         check("image_height: 480\n", "", "image_height is missing");
         check("480", "480.5", "line 2: image_height must be a whole number of 1 to 16384 pixels");
         check("480", "tall", "line 2: image_height has \"tall\", expected a finite number");
-        check("plumb_bob", "equidistant", "line 10: distortion_model must be plumb_bob (k1 k2 p1 p2 k3), which is what this models");
-        check("[ 0.8, 0. , 0.6,", "[ 0.9, 0. , 0.6,", "line 15: rectification_matrix must be a rotation: orthonormal, determinant 1");
+        check(
+            "plumb_bob",
+            "equidistant",
+            "line 10: distortion_model must be plumb_bob (k1 k2 p1 p2 k3), which is what this models",
+        );
+        check(
+            "[ 0.8, 0. , 0.6,",
+            "[ 0.9, 0. , 0.6,",
+            "line 15: rectification_matrix must be a rotation: orthonormal, determinant 1",
+        );
         check("cols: 4", "cols: 3", "line 21: expected rows and cols that fit the data of a matrix");
-        check("0., 1., 0.]", "0., 2., 0.]", "line 21: projection_matrix must be [fx 0 cx Tx; 0 fy cy Ty; 0 0 1 0] with positive focal lengths");
+        check(
+            "0., 1., 0.]",
+            "0., 2., 0.]",
+            "line 21: projection_matrix must be [fx 0 cx Tx; 0 fy cy Ty; 0 0 1 0] with positive focal lengths",
+        );
         check("0.000000]", "0.000000, 0.1]", "line 11: expected rows and cols that fit the data of a matrix");
-        check("cols: 5\n  data: [-0.363528,", "cols: 8\n  data: [0, 0, 0.1, -0.363528,", "line 11: distortion_coefficients uses more than k1 k2 p1 p2 k3, which this does not model");
+        check(
+            "cols: 5\n  data: [-0.363528,",
+            "cols: 8\n  data: [0, 0, 0.1, -0.363528,",
+            "line 11: distortion_coefficients uses more than k1 k2 p1 p2 k3, which this does not model",
+        );
 
         let pair = |left: &str, right: &str| rig(&parse(left).unwrap(), &parse(right).unwrap()).unwrap_err().to_string();
         assert!(pair(&left(), &left()).contains("no baseline"));

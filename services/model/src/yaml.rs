@@ -75,7 +75,11 @@ impl<'a> Document<'a> {
         sides.ok_or_else(|| size.value("must be two whole numbers of 1 to 16384 pixels"))
     }
 
-    pub(crate) fn camera(&self, matrix_key: &'static str, distortion_key: &'static str) -> Result<CameraIntrinsics, RigYamlError> {
+    pub(crate) fn camera(
+        &self,
+        matrix_key: &'static str,
+        distortion_key: &'static str,
+    ) -> Result<CameraIntrinsics, RigYamlError> {
         let list = self.required(matrix_key)?;
         let m = list.matrix3()?;
         if (m.row(2) - nalgebra::RowVector3::new(0.0, 0.0, 1.0)).norm() > 0.0 || m[(0, 1)] != 0.0 || m[(1, 0)] != 0.0 {

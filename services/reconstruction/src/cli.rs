@@ -4,7 +4,7 @@ mod calibrate;
 mod matching;
 
 pub use calibrate::{
-    CalibrateCliError, CalibrateReport, CalibrateRequest, CameraReport, CoverageReport, DepthReport, ErrorByViewsReport, ViewReport,
-    calibrate, convert_rig,
+    CalibrateCliError, CalibrateReport, CalibrateRequest, CameraReport, CoverageReport, DepthReport, ErrorByViewsReport,
+    ViewReport, calibrate, convert_rig,
 };
 pub use matching::{MatchCliError, MatchReport, match_pair};

@@ -18,11 +18,12 @@ pub enum RigFileError {
     #[error(transparent)]
     File(#[from] FileError),
     /// What is in it.
-    #[error("{} is no calibration: {source}", path.display())]
+    #[error("{} is no calibration", path.display())]
     Content {
         /// The file, or the folder of the two.
         path: PathBuf,
         /// What is wrong.
+        #[source]
         source: RigYamlError,
     },
 }

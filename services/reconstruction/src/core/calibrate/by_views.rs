@@ -9,7 +9,7 @@ use super::bundle::{Free, Guess, Scene, View, minimise};
 use super::fit::RigFit;
 
 /// Subsets for each number of views: enough to see a trend through luck.
-const SUBSETS: usize = 4;
+const SUBSETS_MAX: usize = 8;
 
 /// Reprojection error of calibrations from `views` views.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,17 +35,20 @@ pub(super) fn error_by_views(scene: &Scene, fit: &RigFit, size: (u32, u32), seed
     for count in VIEWS_MIN..=all {
         let (mut inside, mut outside) = (Mean::default(), Mean::default());
         let mut subsets = 0;
-        for _ in 0..if count == all { 1 } else { SUBSETS } {
-            order.shuffle(&mut random);
-            let (used, unused) = order.split_at(count);
+        // One shuffled order, entered at evenly spaced places and followed in a ring: every view is in, and out, about equally often.
+        order.shuffle(&mut random);
+        let choices = if count == all { 1 } else { SUBSETS_MAX.min(all) };
+        for choice in 0..choices {
+            let mut ring = order.clone();
+            ring.rotate_left(choice * all / choices);
+            let (used, unused) = ring.split_at(count);
             let (used, unused) = (part(scene, &fit.solved.guess, used), part(scene, &fit.solved.guess, unused));
             // A subset that does not determine the cameras says nothing.
             let Some(found) = RigFit::new(&used.0, &used.1, fit.model, fit.warp, size) else { continue };
             subsets += 1;
             inside.add(&used.0, &found.solved.guess);
             if !unused.0.views.is_empty()
-                && let Some(placed) =
-                    minimise(&unused.0, &Guess { poses: unused.1.poses, ..found.solved.guess }, &Free::POSES)
+                && let Some(placed) = minimise(&unused.0, &Guess { poses: unused.1.poses, ..found.solved.guess }, &Free::POSES)
             {
                 outside.add(&unused.0, &placed.guess);
             }

@@ -1,5 +1,6 @@
 //! The rig: every distortion model, flat or warped board, the best kept; from many starts, so that a bad minimum shows.
 
+use halcyon_model::CameraIntrinsics;
 use opencv::Result;
 
 use super::board::BoardSpec;
@@ -37,6 +38,19 @@ impl RigFit {
 
     pub(super) fn free(&self) -> Free {
         Free::rig(self.model, self.warp)
+    }
+
+    /// The same error, and by the same cameras: to a hundredth of a pixel and a ten-thousandth of the baseline.
+    fn agrees_with(&self, other: &Self) -> bool {
+        let (a, b) = (&self.solved.guess, &other.solved.guess);
+        let pixels = |a: &CameraIntrinsics, b: &CameraIntrinsics| {
+            (a.matrix() - b.matrix()).abs().max() < 0.01
+                && a.distortion.iter().zip(&b.distortion).all(|(a, b)| (a - b).abs() < 1e-3)
+        };
+        self.rms_px <= other.rms_px * (1.0 + SAME_END)
+            && pixels(&a.left, &b.left)
+            && pixels(&a.right, &b.right)
+            && (a.right_from_left_m - b.right_from_left_m).norm() < 1e-4 * b.right_from_left_m.norm()
     }
 
     /// Bayesian information criterion, up to what all models share: n ln(mean square) + parameters · ln n.
@@ -93,6 +107,6 @@ pub(super) fn search(
         ends.extend(from.and_then(|from| RigFit::new(&scene, &from.without(&Free::rig(model, warp)), model, warp, size)));
     }
     let Some(best) = ends.iter().min_by(|a, b| a.rms_px.total_cmp(&b.rms_px)) else { return Ok(None) };
-    let agreeing = ends.iter().filter(|end| end.rms_px <= best.rms_px * (1.0 + SAME_END)).count();
+    let agreeing = ends.iter().filter(|end| end.agrees_with(best)).count();
     Ok(Some(Search { best: best.clone(), starts: starts.len(), agreeing }))
 }

@@ -28,7 +28,8 @@ pub(super) fn common_size(views: &[(Image, Image)]) -> Result<(u32, u32), Calibr
 /// A picture given twice, or as left and right of one pair, is a slip that would pass for very good data.
 pub(super) fn require_different(views: &[(Image, Image)]) -> Result<(), CalibrateError> {
     let sides = |(view, (left, right))| [(view, "left", left), (view, "right", right)];
-    let pictures: Vec<(usize, &str, &Image)> = views.iter().enumerate().map(|(view, (l, r))| (view, (l, r))).flat_map(sides).collect();
+    let pictures: Vec<(usize, &str, &Image)> =
+        views.iter().enumerate().map(|(view, (l, r))| (view, (l, r))).flat_map(sides).collect();
     for (at, &(first, first_side, picture)) in pictures.iter().enumerate() {
         // Two pictures of nothing are alike, and harmless.
         let is_blank = picture.pixels().iter().all(|pixel| *pixel == picture.pixels()[0]);
@@ -65,7 +66,11 @@ pub(super) fn look(
 }
 
 /// Too few views have the board: because it is another one, because there is none, or just so.
-pub(super) fn explain_missing(views: &[(Image, Image)], board: &BoardSpec, usable: usize) -> Result<CalibrateError, CalibrateError> {
+pub(super) fn explain_missing(
+    views: &[(Image, Image)],
+    board: &BoardSpec,
+    usable: usize,
+) -> Result<CalibrateError, CalibrateError> {
     let (cols, rows) = (board.cols(), board.rows());
     if usable > 0 {
         return Ok(CalibrateError::TooFewViews { views: views.len(), usable });

@@ -115,7 +115,7 @@ pub struct Calibration {
     pub views: Vec<ViewQuality>,
     /// Corners seen in the pairs where both boards were found, each counted once left and once right.
     pub corners_total: usize,
-    /// Of those, the ones left out as outliers in views that are used.
+    /// Of those, the ones left out as outliers, and all of views left out.
     pub corners_rejected: usize,
     /// Root mean square **distance** from seen to predicted corner over both cameras and the corners used, pixels: what OpenCV's
     /// `stereoCalibrate` returns.
@@ -243,6 +243,8 @@ fn calibrate_sightings(
         quality[sighting.view] = view_quality(sighting, residuals);
     }
     let used = || sightings.iter().zip(&residuals).filter(|(sighting, _)| sighting.is_used());
+    let corners_total = 2 * sightings.len() * board.corners();
+    let corners_used: usize = used().map(|(sighting, _)| sighting.kept_count()).sum();
     let errors: Vec<f64> = quality
         .iter()
         .filter(|view| view.problem.is_none())
@@ -254,8 +256,8 @@ fn calibrate_sightings(
         board_warp_m: fit.warp.then_some(fit.solved.guess.warp_m),
         sigmas: Sigmas::new(&rig, &covariance),
         depth: DepthUncertainty::new(&rig, &covariance, distance_m),
-        corners_total: 2 * sightings.len() * board.corners(),
-        corners_rejected: used().map(|(sighting, _)| 2 * board.corners() - sighting.kept_count()).sum(),
+        corners_total,
+        corners_rejected: corners_total - corners_used,
         stereo_rms_px: fit.rms_px,
         stereo_rms_all_px: plain.rms_px,
         left_rms_px: check::rms_px(used(), &[Side::Left]),
@@ -375,7 +377,8 @@ impl Work<'_> {
 
 fn view_quality(sighting: &Sighting, residuals: &Residuals) -> ViewQuality {
     let mean = |side: Side| {
-        let (sum, count) = sighting.kept(side).fold((0.0, 0), |(sum, count), i| (sum + residuals.of(side)[i].norm(), count + 1));
+        let (sum, count) =
+            sighting.kept(side).fold((0.0, 0), |(sum, count), i| (sum + residuals.of(side)[i].norm(), count + 1));
         sum / f64::from(count)
     };
     let rejected = |side: Side| sighting.keep(side).iter().filter(|keep| !**keep).count();

@@ -5,7 +5,7 @@
 //! principal point and distortion, each with the boards' poses and the rig that suit it, and the best end is taken.
 
 use halcyon_model::CameraIntrinsics;
-use nalgebra::Vector2;
+use nalgebra::{Vector2, Vector3};
 use opencv::core::{Mat, Point2f, Point3f, Size, TermCriteria, TermCriteria_Type, Vector};
 use opencv::{Result, calib3d};
 use rand::{Rng, SeedableRng};
@@ -64,9 +64,22 @@ pub(super) fn guess(sightings: &[Sighting], board: &BoardSpec, (left, right): &C
         relative.extend(in_right.map(|in_right| in_left.to(&in_right)));
         poses.push(in_left);
     }
-    // The medoid: the one candidate nearest to all others, in angle. A single wrong pose does not move it.
+    // The medoid: the candidate nearest to all others, in angle. A single wrong pose does not move it. Cameras that are far off
+    // put boards at wrong distances; then the next best may be needed to have them all in front of the right camera.
     let unease = |candidate: &Pose| relative.iter().map(|other| candidate.angle_rad(other)).sum::<f64>();
-    let rig = relative.iter().min_by(|a, b| unease(a).total_cmp(&unease(b)));
+    let mut candidates: Vec<(f64, &Pose)> = relative.iter().map(|candidate| (unease(candidate), candidate)).collect();
+    candidates.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let flat = Vector2::zeros();
+    let is_in_front = |rig: &Pose| {
+        let seen = |pose: &Pose| (0..board.corners()).all(|i| rig.apply(&pose.apply(&board.corner_m(i, &flat))).z > 0.0);
+        poses.iter().all(seen)
+    };
+    // In the worst case cameras side by side: what is in front of the one is in front of the other.
+    let level = candidates.first().map(|(_, rig)| Pose {
+        camera_from_board_m: rig.camera_from_board_m.component_mul(&Vector3::new(1.0, 1.0, 0.0)),
+        ..**rig
+    });
+    let rig = candidates.iter().map(|(_, rig)| **rig).chain(level).find(is_in_front);
     Ok(rig.map(|rig| Guess {
         left: *left,
         right: *right,
@@ -79,7 +92,7 @@ pub(super) fn guess(sightings: &[Sighting], board: &BoardSpec, (left, right): &C
 
 /// `count` pairs of cameras to start from: as found alone; the same without distortion; a nominal camera, centred and square,
 /// with the mean focal length of both; and from there on random ones (seeded: the same every time), focal lengths of 0.6 to
-/// 1.7 times the nominal one, principal points within a tenth of the picture about its middle, k1 within ±0.3.
+/// 1.7 times the nominal one, principal points within a tenth of the picture about its middle, k1 within ±0.3 as far as the lens bears it.
 pub(super) fn cameras((left, right): Cameras, (width_px, height_px): (u32, u32), count: usize, seed: u64) -> Vec<Cameras> {
     let plain = |camera: CameraIntrinsics| CameraIntrinsics { distortion: [0.0; 5], ..camera };
     let focal_px = (left.fx_px + left.fy_px + right.fx_px + right.fy_px) / 4.0;
@@ -98,7 +111,12 @@ pub(super) fn cameras((left, right): Cameras, (width_px, height_px): (u32, u32),
         let (cx_px, cy_px) = (nominal.cx_px + off(width_px), nominal.cy_px + off(height_px));
         let k1 = random.random_range(-0.3..0.3);
         let (fx_px, fy_px) = (focal_px * factor, focal_px * factor * squeeze);
-        CameraIntrinsics { fx_px, fy_px, cx_px, cy_px, distortion: [k1, 0.0, 0.0, 0.0, 0.0] }
+        let mut camera = CameraIntrinsics { fx_px, fy_px, cx_px, cy_px, distortion: [k1, 0.0, 0.0, 0.0, 0.0] };
+        // A wide lens folds over with a distortion that a long one bears.
+        while !is_plausible(&camera, (width_px, height_px)) && camera.distortion[0].abs() > 1e-3 {
+            camera.distortion[0] /= 2.0;
+        }
+        camera
     };
     let known = [(left, right), (plain(left), plain(right)), (nominal, nominal)];
     known.into_iter().chain(std::iter::repeat_with(|| (anyhow(), anyhow()))).take(count).collect()

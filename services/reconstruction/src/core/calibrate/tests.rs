@@ -87,17 +87,6 @@ fn sightings(rig: &Rig, board: &BoardSpec, views: usize, sigma_px: f64) -> Vec<S
     pairs.iter().enumerate().map(|(view, pair)| Sighting::new(view, points(&pair.left), points(&pair.right))).collect()
 }
 
-fn truth_of(rig: &Rig) -> Guess {
-    Guess {
-        left: rig.left,
-        right: rig.right,
-        right_from_left: rig.rotation,
-        right_from_left_m: rig.translation_m,
-        warp_m: FLAT,
-        poses: Vec::new(),
-    }
-}
-
 fn board() -> BoardSpec {
     BoardSpec::new(9, 6, 0.03).unwrap()
 }
@@ -105,7 +94,8 @@ fn board() -> BoardSpec {
 #[test]
 fn a_known_rig_is_found_again() {
     let (truth, board) = (rig(), board());
-    let found = calibrate_corners(&views_of(&truth, &board, FLAT, 14, &mut Noise::new(4, 0.1)), board, SIZE, &Options::default());
+    let found =
+        calibrate_corners(&views_of(&truth, &board, FLAT, 14, &mut Noise::new(4, 0.1)), board, SIZE, &Options::default());
     let found = found.unwrap();
     assert_eq!(found.model, DistortionModel::Radial2, "no tangential distortion was put in, none may be found");
     assert_eq!(found.board_warp_m, None, "nor a warp");
@@ -123,7 +113,8 @@ fn a_known_rig_is_found_again() {
 #[test]
 fn exact_corners_give_the_rig_to_the_last_digits_of_their_type() {
     let (truth, board) = (rig(), board());
-    let found = calibrate_corners(&views_of(&truth, &board, FLAT, 8, &mut Noise::new(4, 0.0)), board, SIZE, &Options::default());
+    let found =
+        calibrate_corners(&views_of(&truth, &board, FLAT, 8, &mut Noise::new(4, 0.0)), board, SIZE, &Options::default());
     let found = found.unwrap();
     // Corners are f32: 3e-5 px apart at 500.
     assert!((found.rig.left.fx_px - truth.left.fx_px).abs() < 1e-3, "{:?}", found.rig.left);
@@ -142,6 +133,53 @@ fn a_warped_board_is_seen_to_be_warped() {
     }
     let flat = calibrate_corners(&views, board, SIZE, &Options { flat_board: true, ..Options::default() }).unwrap();
     assert!(flat.board_warp_m.is_none() && flat.stereo_rms_px > 1.2 * found.stereo_rms_px, "{}", flat.stereo_rms_px);
+}
+
+/// Another hand: OpenCV's own joint calibration of the same corners, flat board and all, ends at the same rig and the same error.
+#[test]
+fn opencv_agrees() {
+    use crate::core::cv;
+    use opencv::calib3d;
+    use opencv::core::{Mat, Size, TermCriteria, Vector};
+
+    let (truth, board) = (rig(), board());
+    let seen = sightings(&truth, &board, 10, 0.2);
+    let from = start::guess(&seen, &board, &(truth.left, truth.right)).unwrap().unwrap();
+    let ours = RigFit::new(&Scene::new(&seen, &board), &from, DistortionModel::Radial2, false, SIZE).unwrap();
+    let points =
+        |side: Side| seen.iter().map(|seen| seen.corners(side).iter().copied().collect()).collect::<Vector<Vector<_>>>();
+    let object: Vector<Vector<_>> =
+        seen.iter().map(|_| (0..board.corners()).map(|i| board.corner_point3f(i)).collect()).collect();
+    let mats =
+        |camera: &CameraIntrinsics| (cv::mat_from_matrix3(&camera.matrix()).unwrap(), cv::mat_from_distortion(camera).unwrap());
+    let ((mut m1, mut d1), (mut m2, mut d2)) = (mats(&truth.left), mats(&truth.right));
+    let (mut r, mut t) = (Mat::default(), Mat::default());
+    let (mut e, mut f) = (Mat::default(), Mat::default());
+    let theirs_px = calib3d::stereo_calibrate(
+        &object,
+        &points(Side::Left),
+        &points(Side::Right),
+        &mut m1,
+        &mut d1,
+        &mut m2,
+        &mut d2,
+        Size::new(640, 480),
+        &mut r,
+        &mut t,
+        &mut e,
+        &mut f,
+        calib3d::CALIB_USE_INTRINSIC_GUESS | calib3d::CALIB_FIX_K3 | calib3d::CALIB_ZERO_TANGENT_DIST,
+        TermCriteria::new(3, 200, 1e-9).unwrap(),
+    )
+    .unwrap();
+    assert!((ours.rms_px / theirs_px - 1.0).abs() < 1e-5, "{} {theirs_px}", ours.rms_px);
+    let (left, right) = (cv::intrinsics_from_mats(&m1, &d1).unwrap(), cv::intrinsics_from_mats(&m2, &d2).unwrap());
+    for (ours, theirs) in [(&ours.solved.guess.left, left), (&ours.solved.guess.right, right)] {
+        assert!((ours.matrix() - theirs.matrix()).abs().max() < 0.02, "{ours:?} {theirs:?}");
+        assert!(ours.distortion.iter().zip(theirs.distortion).all(|(a, b)| (a - b).abs() < 1e-3), "{ours:?} {theirs:?}");
+    }
+    let t = cv::vector3_from_mat(&t).unwrap();
+    assert!((ours.solved.guess.right_from_left_m - t).norm() < 2e-6, "{} {t}", ours.solved.guess.right_from_left_m);
 }
 
 /// The gradient in blocks against central differences of the cost, for every shared unknown and a pose.
@@ -193,7 +231,7 @@ fn outliers_go_and_good_corners_stay() {
         };
         assert_eq!(quality.corners_rejected, expected, "view {view}");
     }
-    assert_eq!((found.corners_total, found.corners_rejected), (10 * 2 * 54, 2));
+    assert_eq!((found.corners_total, found.corners_rejected), (10 * 2 * 54, 2 + 2 * 54));
     assert!(found.stereo_rms_px < 0.08 && found.stereo_rms_all_px > 0.3, "{}", found.stereo_rms_px);
     // What was left out is reported where it was seen: 4 px beside its place.
     assert!((found.views[3].left_residuals_px[17].x - 4.0).abs() < 0.3, "{}", found.views[3].left_residuals_px[17]);
@@ -217,7 +255,10 @@ fn corners_that_are_none_are_refused() {
     assert!(matches!(refused, Err(CalibrateError::Corners { view: 2, left: 53, .. })), "{refused:?}");
     let mut bad = views.clone();
     bad[4].right[3].y = f64::NAN;
-    assert!(matches!(calibrate_corners(&bad, board(), SIZE, &Options::default()), Err(CalibrateError::Corners { view: 4, .. })));
+    assert!(matches!(
+        calibrate_corners(&bad, board(), SIZE, &Options::default()),
+        Err(CalibrateError::Corners { view: 4, .. })
+    ));
     let swapped: Vec<_> = views.iter().map(|pair| CornerPair { left: pair.right.clone(), right: pair.left.clone() }).collect();
     let refused = calibrate_corners(&swapped, board(), SIZE, &Options::default());
     assert!(matches!(refused, Err(CalibrateError::Swapped { .. })), "{refused:?}");

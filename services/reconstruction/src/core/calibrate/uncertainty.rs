@@ -57,11 +57,8 @@ impl Sigmas {
 /// (Barfoot, "State Estimation for Robotics", 7.77).
 fn vector_from_turn(vector_rad: &Vector3<f64>) -> Matrix3<f64> {
     let (cross, angle) = (vector_rad.cross_matrix(), vector_rad.norm());
-    let square = if angle < 1e-4 {
-        1.0 / 12.0
-    } else {
-        1.0 / (angle * angle) - (1.0 + angle.cos()) / (2.0 * angle * angle.sin())
-    };
+    let square =
+        if angle < 1e-4 { 1.0 / 12.0 } else { 1.0 / (angle * angle) - (1.0 + angle.cos()) / (2.0 * angle * angle.sin()) };
     Matrix3::identity() - cross / 2.0 + cross * cross * square
 }
 

@@ -131,7 +131,8 @@ pub(super) struct View {
 
 impl View {
     pub(super) fn new(sighting: &Sighting) -> Self {
-        let side = |side: Side| sighting.kept(side).map(|corner| Seen { corner, pixel: sighting.pixel(side, corner) }).collect();
+        let side =
+            |side: Side| sighting.kept(side).map(|corner| Seen { corner, pixel: sighting.pixel(side, corner) }).collect();
         Self { left: side(Side::Left), right: side(Side::Right) }
     }
 }

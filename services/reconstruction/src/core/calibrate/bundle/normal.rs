@@ -43,8 +43,7 @@ impl Normal {
         for (view, pose) in scene.views.iter().zip(&guess.poses) {
             let left = left_rows(&scene.board, guess, pose, &view.left)?;
             let right = right_rows(&scene.board, guess, pose, &view.right)?;
-            let mut part =
-                ViewNormal { pose: Matrix6::zeros(), cross: SMatrix::zeros(), gradient: Vector6::zeros() };
+            let mut part = ViewNormal { pose: Matrix6::zeros(), cross: SMatrix::zeros(), gradient: Vector6::zeros() };
             normal.add(&mut part, &left, &[(WARP, 2), (LEFT, INTRINSICS)]);
             normal.add(&mut part, &right, &[(WARP, 2), (RIGHT, INTRINSICS), (RIG, 6)]);
             normal.views.push(part);

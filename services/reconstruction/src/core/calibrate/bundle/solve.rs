@@ -106,9 +106,8 @@ impl Step {
             .map(|(view, inverse)| inverse * (view.gradient - view.cross.tr_mul(&shared)))
             .collect();
         // ½ hᵀ(λ D h + g), twice.
-        let mut promised_px2 = (0..SHARED)
-            .map(|i| shared[i] * (damping * normal.shared[(i, i)] * shared[i] + normal.gradient[i]))
-            .sum::<f64>();
+        let mut promised_px2 =
+            (0..SHARED).map(|i| shared[i] * (damping * normal.shared[(i, i)] * shared[i] + normal.gradient[i])).sum::<f64>();
         for (view, step) in normal.views.iter().zip(&poses) {
             promised_px2 += (0..6).map(|i| step[i] * (damping * view.pose[(i, i)] * step[i] + view.gradient[i])).sum::<f64>();
         }
