@@ -113,6 +113,12 @@ fn bad_input_to_calibrate_is_named() {
         }
         other => panic!("{other:?}"),
     }
+    // A part of the board is found in most pictures, and is not the board.
+    let part = calibrate(&left, &right, "8x6", None);
+    assert!(
+        matches!(part, Err(CalibrateCliError::Calibrate(CalibrateError::WrongBoard { seen_cols: 9, seen_rows: 6, .. }))),
+        "{part:?}"
+    );
     let mixed = calibrate(&first("left"), &samples().join("aloeL.jpg").to_string_lossy(), "9x6", None);
     assert!(matches!(mixed, Err(CalibrateCliError::Calibrate(CalibrateError::MixedSizes { view: 0, .. }))));
     let blank = write_pgm(folder.path(), "blank.pgm", 64, 48, &vec![90; 64 * 48]);

@@ -27,16 +27,21 @@ pub struct BoardSpec {
 impl BoardSpec {
     /// The fewest inner corners along a side that the detector can tell from clutter.
     const SIDE_MIN: u32 = 3;
+    /// Fewer than this turn up in pictures of leaves and gravel.
+    pub(super) const SIDE_CREDIBLE: u32 = 4;
     /// More than any board has.
     const SIDE_MAX: u32 = 64;
+
+    /// Squares that a board can have, metres: from a microscope's slide to a house's wall.
+    const SQUARE_M: std::ops::RangeInclusive<f64> = 1e-4..=100.0;
 
     /// A board of `cols × rows` inner corners whose squares are `square_m` wide.
     ///
     /// # Errors
-    /// [`CalibrateError::Board`] unless both sides have 3 to 64 inner corners and the square is finite and above 0.
+    /// [`CalibrateError::Board`] unless both sides have 3 to 64 inner corners and the square is 0.1 mm to 100 m wide.
     pub fn new(cols: u32, rows: u32, square_m: f64) -> Result<Self, CalibrateError> {
         let sides = Self::SIDE_MIN..=Self::SIDE_MAX;
-        if sides.contains(&cols) && sides.contains(&rows) && square_m.is_finite() && square_m > 0.0 {
+        if sides.contains(&cols) && sides.contains(&rows) && Self::SQUARE_M.contains(&square_m) {
             Ok(Self { cols, rows, square_m })
         } else {
             Err(CalibrateError::Board { cols, rows, square_m })
@@ -144,13 +149,14 @@ pub(super) fn find(image: &Image, board: &BoardSpec) -> Result<Option<Vec<Point2
     Ok(Some(corners))
 }
 
-/// The board that a picture does show, whatever its size: for the message when the expected one is nowhere.
-pub(super) fn find_any(image: &Image) -> Result<Option<(u32, u32)>, opencv::Error> {
+/// The board that a picture does show, of `least` inner corners a side or more: for the message when the expected one is
+/// nowhere, and to notice that the expected one is but a part of it.
+pub(super) fn find_larger(image: &Image, (cols, rows): (u32, u32)) -> Result<Option<(u32, u32)>, opencv::Error> {
     let picture = cv::mat_from_image(image)?;
     let (mut corners, mut meta) = (Vector::<Point2f>::new(), Mat::default());
     let flags = calib3d::CALIB_CB_NORMALIZE_IMAGE | calib3d::CALIB_CB_EXHAUSTIVE | calib3d::CALIB_CB_LARGER;
-    let side = BoardSpec::SIDE_MIN as i32;
-    let found = calib3d::find_chessboard_corners_sb_with_meta(&picture, Size::new(side, side), &mut corners, flags, &mut meta)?;
+    let least = Size::new(cols as i32, rows as i32);
+    let found = calib3d::find_chessboard_corners_sb_with_meta(&picture, least, &mut corners, flags, &mut meta)?;
     Ok(found.then(|| (meta.cols() as u32, meta.rows() as u32)))
 }
 
@@ -197,7 +203,9 @@ mod tests {
 
     #[test]
     fn impossible_boards_are_refused() {
-        for (cols, rows, square_m) in [(2, 6, 0.1), (9, 0, 0.1), (9, 65, 0.1), (9, 6, 0.0), (9, 6, -1.0), (9, 6, f64::NAN)] {
+        for (cols, rows, square_m) in
+            [(2, 6, 0.1), (9, 0, 0.1), (9, 65, 0.1), (9, 6, 0.0), (9, 6, -1.0), (9, 6, f64::NAN), (9, 6, 1e300)]
+        {
             assert!(matches!(BoardSpec::new(cols, rows, square_m), Err(CalibrateError::Board { .. })), "{cols}x{rows}");
         }
     }

@@ -6,7 +6,7 @@ use super::VIEWS_MIN;
 #[derive(Debug, thiserror::Error)]
 pub enum CalibrateError {
     /// No such board.
-    #[error("a board needs 3 to 64 inner corners a side and squares wider than 0 m, not {cols}x{rows} of {square_m} m")]
+    #[error("a board needs 3 to 64 inner corners a side and squares of 0.0001 to 100 m, not {cols}x{rows} of {square_m} m")]
     Board {
         /// Inner corners along a row.
         cols: u32,
@@ -48,7 +48,7 @@ pub enum CalibrateError {
         pictures: usize,
     },
     /// A board, but another one.
-    #[error("no board of {cols}x{rows} inner corners was found; the pictures seem to show one of {seen_cols}x{seen_rows}")]
+    #[error("the pictures show no board of {cols}x{rows} inner corners; they seem to show one of {seen_cols}x{seen_rows}")]
     WrongBoard {
         /// Inner corners along a row, as asked.
         cols: u32,

@@ -65,6 +65,26 @@ pub(super) fn look(
     Ok((sightings, quality))
 }
 
+/// A board can be found as a part of a larger one, each time another part: that calibrates, badly. So the first few pictures
+/// are asked whether there is more of it.
+pub(super) fn require_whole(views: &[(Image, Image)], board: &BoardSpec, sightings: &[Sighting]) -> Result<(), CalibrateError> {
+    const ASKED: usize = 3;
+    let (cols, rows) = (board.cols(), board.rows());
+    let mut larger: Vec<(u32, u32)> = Vec::new();
+    let asked = sightings.iter().take(ASKED);
+    for sighting in asked.clone() {
+        let seen = board::find_larger(&views[sighting.view].0, (cols, rows))?;
+        larger.extend(seen.filter(|(seen_cols, seen_rows)| seen_cols * seen_rows > cols * rows));
+    }
+    // Once may be clutter beside the board.
+    match larger.first() {
+        Some(&(seen_cols, seen_rows)) if 2 * larger.len() > asked.len() => {
+            Err(CalibrateError::WrongBoard { cols, rows, seen_cols, seen_rows })
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Too few views have the board: because it is another one, because there is none, or just so.
 pub(super) fn explain_missing(
     views: &[(Image, Image)],
@@ -77,7 +97,7 @@ pub(super) fn explain_missing(
     }
     // A few pictures tell; all of them would take long for nothing.
     for (left, _) in views.iter().take(5) {
-        if let Some((seen_cols, seen_rows)) = board::find_any(left)?
+        if let Some((seen_cols, seen_rows)) = board::find_larger(left, (BoardSpec::SIDE_CREDIBLE, BoardSpec::SIDE_CREDIBLE))?
             && (seen_cols, seen_rows) != (cols, rows)
         {
             return Ok(CalibrateError::WrongBoard { cols, rows, seen_cols, seen_rows });

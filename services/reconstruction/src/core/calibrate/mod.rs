@@ -169,6 +169,7 @@ pub fn calibrate_with(
     if sightings.len() < VIEWS_MIN {
         return Err(look::explain_missing(views, &board, sightings.len())?);
     }
+    look::require_whole(views, &board, &sightings)?;
     calibrate_sightings(sightings, quality, &board, size, options)
 }
 

@@ -147,9 +147,9 @@ fn opencv_agrees() {
     let from = start::guess(&seen, &board, &(truth.left, truth.right)).unwrap().unwrap();
     let ours = RigFit::new(&Scene::new(&seen, &board), &from, DistortionModel::Radial2, false, SIZE).unwrap();
     let points =
-        |side: Side| seen.iter().map(|seen| seen.corners(side).iter().copied().collect()).collect::<Vector<Vector<_>>>();
-    let object: Vector<Vector<_>> =
-        seen.iter().map(|_| (0..board.corners()).map(|i| board.corner_point3f(i)).collect()).collect();
+        |side: Side| -> Vector<Vector<Point2f>> { seen.iter().map(|seen| Vector::from_slice(seen.corners(side))).collect() };
+    let flat: Vec<_> = (0..board.corners()).map(|i| board.corner_point3f(i)).collect();
+    let object: Vector<Vector<opencv::core::Point3f>> = seen.iter().map(|_| Vector::from_slice(&flat)).collect();
     let mats =
         |camera: &CameraIntrinsics| (cv::mat_from_matrix3(&camera.matrix()).unwrap(), cv::mat_from_distortion(camera).unwrap());
     let ((mut m1, mut d1), (mut m2, mut d2)) = (mats(&truth.left), mats(&truth.right));
