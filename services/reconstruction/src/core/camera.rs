@@ -32,8 +32,7 @@ pub struct Slopes {
 #[must_use]
 #[inline]
 pub fn project_with_slopes(camera: &CameraIntrinsics, point_m: &Vector3<f64>) -> Option<(Vector2<f64>, Slopes)> {
-    // Not "z <= 0": NaN is refused as well.
-    if !(point_m.z > 0.0) {
+    if point_m.z.is_nan() || point_m.z <= 0.0 {
         return None;
     }
     let [k1, k2, p1, p2, k3] = camera.distortion;

@@ -184,3 +184,40 @@ fn depth(page: &mut Page, report: &CalibrateReport) -> Result<(), ChartError> {
     page.figure(&over_picture(report, depth.cols, values, "mm")?, &caption);
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use halcyon_reconstruction::cli::{CalibrateRequest, calibrate};
+    use halcyon_reconstruction::core::calibrate::Options;
+
+    #[test]
+    fn numbers_have_the_digits_that_their_uncertainty_leaves() {
+        assert_eq!(measured(534.001_35, 0.587), "534.00 ± 0.59");
+        assert_eq!(measured(0.083_150_1, 7.35e-5), "0.083150 ± 0.000073");
+        assert_eq!(measured(1234.5, 62.0), "1234 ± 62");
+        assert_eq!(measured(1.0, 0.0), "1.000000 ± 0.000000");
+    }
+
+    #[test]
+    fn a_page_has_all_its_figures_and_loads_nothing() {
+        let glob = |side: &str| format!("{}/../../samples/{side}1?.jpg", env!("CARGO_MANIFEST_DIR"));
+        let (left, right) = (glob("left"), glob("right"));
+        let request = CalibrateRequest {
+            left: &left,
+            right: &right,
+            board: "9x6",
+            square_m: 0.025,
+            options: Options { starts: 3, ..Options::default() },
+            out: None,
+            ros: None,
+        };
+        let (report, calibration) = calibrate(&request, &mut |_, _| {}).unwrap();
+        let html = page(&report, &calibration).unwrap();
+        assert_eq!(html.matches("<svg").count(), 6, "views, number of views, coverage twice, residuals, depth");
+        for part in ["left11.jpg, right11.jpg", "fx, px", "figure 3-7", "Depth uncertainty"] {
+            assert!(html.contains(part), "{part}");
+        }
+        assert!(!html.contains("<script") && !html.contains("src="));
+    }
+}

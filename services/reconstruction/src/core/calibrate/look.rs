@@ -65,22 +65,21 @@ pub(super) fn look(
     Ok((sightings, quality))
 }
 
-/// A board can be found as a part of a larger one, each time another part: that calibrates, badly. So the first few pictures
-/// are asked whether there is more of it.
+/// A board can be found as a part of a larger one, each time another part: that calibrates, badly. So some of the pictures are
+/// asked whether there is more of it. One of them may see another row in the clutter about the board; that most of them see
+/// the same is no accident.
 pub(super) fn require_whole(views: &[(Image, Image)], board: &BoardSpec, sightings: &[Sighting]) -> Result<(), CalibrateError> {
-    const ASKED: usize = 3;
+    const ASKED: usize = 5;
     let (cols, rows) = (board.cols(), board.rows());
-    let mut larger: Vec<(u32, u32)> = Vec::new();
     let asked = sightings.iter().take(ASKED);
+    let mut larger: Vec<(u32, u32)> = Vec::new();
     for sighting in asked.clone() {
         let seen = board::find_larger(&views[sighting.view].0, (cols, rows))?;
-        larger.extend(seen.filter(|(seen_cols, seen_rows)| seen_cols * seen_rows > cols * rows));
+        larger.extend(seen.map(|(a, b)| (a.max(b), a.min(b))).filter(|(long, short)| long * short > cols * rows));
     }
-    // Once may be clutter beside the board.
-    match larger.first() {
-        Some(&(seen_cols, seen_rows)) if 2 * larger.len() > asked.len() => {
-            Err(CalibrateError::WrongBoard { cols, rows, seen_cols, seen_rows })
-        }
+    let votes = |size: &(u32, u32)| larger.iter().filter(|other| *other == size).count();
+    match larger.iter().max_by_key(|size| votes(size)) {
+        Some(size) if 2 * votes(size) > asked.len() => Err(wrong_board(board, *size)),
         _ => Ok(()),
     }
 }
@@ -99,9 +98,17 @@ pub(super) fn explain_missing(
     for (left, _) in views.iter().take(5) {
         if let Some((seen_cols, seen_rows)) = board::find_larger(left, (BoardSpec::SIDE_CREDIBLE, BoardSpec::SIDE_CREDIBLE))?
             && (seen_cols, seen_rows) != (cols, rows)
+            && (seen_rows, seen_cols) != (cols, rows)
         {
-            return Ok(CalibrateError::WrongBoard { cols, rows, seen_cols, seen_rows });
+            return Ok(wrong_board(board, (seen_cols, seen_rows)));
         }
     }
     Ok(CalibrateError::NoBoard { cols, rows, pictures: 2 * views.len() })
+}
+
+/// Which side of a board is "along" depends on how it was held: the message has it as the board asked for.
+fn wrong_board(board: &BoardSpec, (a, b): (u32, u32)) -> CalibrateError {
+    let (cols, rows) = (board.cols(), board.rows());
+    let (seen_cols, seen_rows) = if cols >= rows { (a.max(b), a.min(b)) } else { (a.min(b), a.max(b)) };
+    CalibrateError::WrongBoard { cols, rows, seen_cols, seen_rows }
 }
