@@ -5,5 +5,6 @@
 
 pub mod cli;
 pub mod fleet;
+pub mod report;
 pub mod simulator;
 pub mod witness;

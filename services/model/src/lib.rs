@@ -16,6 +16,7 @@
 //!
 //! **Invariant:** nothing here knows serde, prost, tokio or Zenoh, so the nouns are free to change shape.
 
+pub mod camera_info;
 pub mod command;
 pub mod fleet;
 pub mod geo;
@@ -28,6 +29,7 @@ pub mod service;
 pub mod stereo;
 pub mod time;
 pub mod vehicle;
+mod yaml;
 
 pub use bytes::Bytes;
 pub use command::{CommandReply, MissionAction, MissionCommand, VehicleAction, VehicleCommand};

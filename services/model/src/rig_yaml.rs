@@ -6,18 +6,15 @@
 //! default zero). Other keys are left alone: calibration programs add theirs. This reads the subset of YAML that
 //! `FileStorage` writes, and nothing of the disk: text in, text out.
 
-use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::stereo::{CameraIntrinsics, Image, RigCalibration};
+use crate::stereo::RigCalibration;
+use crate::yaml::Document;
 
 /// Texts longer than this are not a rig's calibration; bounds what a hostile file can cost.
 pub const TEXT_BYTES_MAX: usize = 1 << 20;
-
-/// How far from orthonormal a rotation may be: files with six digits pass, a transposed or scaled matrix doesn't.
-const ROTATION_TOLERANCE: f64 = 1e-4;
 
 /// Why a text is not a rig's calibration. Lines count from 1.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -84,6 +81,12 @@ pub enum RigYamlError {
         /// What is wrong.
         why: &'static str,
     },
+    /// Two files that are not of one rig.
+    #[error("the left and the right camera do not make a rig: {why}")]
+    Pair {
+        /// What is wrong.
+        why: &'static str,
+    },
 }
 
 /// Reads a calibration.
@@ -143,196 +146,10 @@ pub fn write(rig: &RigCalibration) -> String {
     text
 }
 
-/// The top-level entries, not yet read.
-struct Document<'a> {
-    entries: BTreeMap<&'a str, Entry<'a>>,
-}
-
-/// One top-level key: the line it stands on, and the lines of its value without comments.
-struct Entry<'a> {
-    line: usize,
-    lines: Vec<&'a str>,
-}
-
-impl<'a> Document<'a> {
-    fn read(text: &'a str) -> Result<Self, RigYamlError> {
-        let mut entries: BTreeMap<&str, Entry<'_>> = BTreeMap::new();
-        let mut current: Option<&str> = None;
-        for (index, raw) in text.trim_start_matches('\u{feff}').lines().enumerate() {
-            let line = index + 1;
-            let content = without_comment(raw);
-            if content.trim().is_empty() || raw.starts_with('%') || raw.starts_with("---") || raw.trim_end() == "..." {
-                continue;
-            }
-            if content.starts_with([' ', '\t', '-']) {
-                let entry = current.and_then(|key| entries.get_mut(key));
-                entry
-                    .ok_or(RigYamlError::Syntax { line, expected: "a key at the start of the line" })?
-                    .lines
-                    .push(content.trim());
-                continue;
-            }
-            let (key, value) = content.split_once(':').ok_or(RigYamlError::Syntax { line, expected: "\"key: value\"" })?;
-            let key = key.trim().trim_matches('"');
-            if entries.insert(key, Entry { line, lines: vec![value.trim()] }).is_some() {
-                return Err(RigYamlError::Duplicate { line, key: key.chars().take(80).collect() });
-            }
-            current = Some(key);
-        }
-        Ok(Self { entries })
-    }
-
-    fn optional(&self, key: &'static str) -> Result<Option<List>, RigYamlError> {
-        self.entries.get(key).map(|entry| entry.list(key)).transpose()
-    }
-
-    fn required(&self, key: &'static str) -> Result<List, RigYamlError> {
-        self.optional(key)?.ok_or(RigYamlError::Missing { key })
-    }
-
-    fn image_size(&self) -> Result<(u32, u32), RigYamlError> {
-        let size = self.required("image_size")?;
-        let [width, height] = size.values[..] else { return Err(size.shape("2 numbers: width, height")) };
-        let side = |value: f64| {
-            let fits = value.fract() == 0.0 && (1.0..=f64::from(Image::SIDE_PX_MAX)).contains(&value);
-            fits.then_some(value as u32).ok_or(size.value("must be two whole numbers of 1 to 16384 pixels"))
-        };
-        Ok((side(width)?, side(height)?))
-    }
-
-    fn camera(&self, matrix_key: &'static str, distortion_key: &'static str) -> Result<CameraIntrinsics, RigYamlError> {
-        let list = self.required(matrix_key)?;
-        let m = list.matrix3()?;
-        if (m.row(2) - nalgebra::RowVector3::new(0.0, 0.0, 1.0)).norm() > 0.0 || m[(0, 1)] != 0.0 || m[(1, 0)] != 0.0 {
-            return Err(list.value("must be [fx 0 cx; 0 fy cy; 0 0 1]"));
-        }
-        if m[(0, 0)] <= 0.0 || m[(1, 1)] <= 0.0 {
-            return Err(list.value("must have positive focal lengths"));
-        }
-        let coefficients = self.required(distortion_key)?;
-        let mut distortion = [0.0; 5];
-        let count = coefficients.values.len();
-        if !(matches!(count, 4 | 5 | 8 | 12 | 14) && (coefficients.rows == 1 || coefficients.cols == 1)) {
-            return Err(coefficients.shape("a row or a column of 4 or 5 numbers"));
-        }
-        if coefficients.values.iter().skip(5).any(|&value| value != 0.0) {
-            return Err(coefficients.value("uses more than k1 k2 p1 p2 k3, which this does not model"));
-        }
-        distortion.iter_mut().zip(&coefficients.values).for_each(|(to, from)| *to = *from);
-        Ok(CameraIntrinsics { fx_px: m[(0, 0)], fy_px: m[(1, 1)], cx_px: m[(0, 2)], cy_px: m[(1, 2)], distortion })
-    }
-}
-
-impl Entry<'_> {
-    /// Reads `!!opencv-matrix`, `[ a, b ]` and `- a` forms alike.
-    fn list(&self, key: &'static str) -> Result<List, RigYamlError> {
-        let line = self.line;
-        let is_matrix = self.lines[0].starts_with("!!opencv-matrix");
-        let (mut rows, mut cols, mut data) = (None, None, String::new());
-        if is_matrix {
-            for text in &self.lines[1..] {
-                if let Some(count) = text.strip_prefix("rows:") {
-                    rows = count.trim().parse::<usize>().ok();
-                } else if let Some(count) = text.strip_prefix("cols:") {
-                    cols = count.trim().parse::<usize>().ok();
-                } else if !text.starts_with("dt:") {
-                    data.push_str(text.strip_prefix("data:").unwrap_or(text));
-                    data.push(' ');
-                }
-            }
-        } else {
-            for (index, text) in self.lines.iter().enumerate() {
-                // A block sequence has one "- value" a line; make commas of the dashes.
-                match text.strip_prefix("- ") {
-                    Some(item) => {
-                        data.push_str(if data.trim().is_empty() { "[" } else { "," });
-                        data.push_str(item);
-                        data.push_str(if index + 1 == self.lines.len() { "]" } else { "" });
-                    }
-                    None => {
-                        data.push_str(text);
-                        data.push(' ');
-                    }
-                }
-            }
-        }
-        let inner = data.trim().strip_prefix('[').and_then(|rest| rest.strip_suffix(']'));
-        let inner = inner.ok_or(RigYamlError::Syntax { line, expected: "a list of numbers in [ ]" })?;
-        let values = inner
-            .split(',')
-            .map(str::trim)
-            .filter(|text| !text.is_empty())
-            .map(|text| {
-                let value = text.parse::<f64>().ok().filter(|value| value.is_finite());
-                value.ok_or_else(|| RigYamlError::Number { line, key, text: text.chars().take(40).collect() })
-            })
-            .collect::<Result<Vec<_>, _>>()?;
-        let (rows, cols) = if is_matrix {
-            let expected = "rows and cols that fit the data of an opencv-matrix";
-            let (rows, cols) = rows.zip(cols).ok_or(RigYamlError::Syntax { line, expected })?;
-            if rows.checked_mul(cols) != Some(values.len()) {
-                return Err(RigYamlError::Syntax { line, expected });
-            }
-            (rows, cols)
-        } else {
-            (1, values.len())
-        };
-        Ok(List { key, line, rows, cols, values })
-    }
-}
-
-/// Numbers with their shape, row-major.
-struct List {
-    key: &'static str,
-    line: usize,
-    rows: usize,
-    cols: usize,
-    values: Vec<f64>,
-}
-
-impl List {
-    fn shape(&self, expected: &'static str) -> RigYamlError {
-        RigYamlError::Shape { line: self.line, key: self.key, rows: self.rows, cols: self.cols, expected }
-    }
-
-    fn value(&self, why: &'static str) -> RigYamlError {
-        RigYamlError::Value { line: self.line, key: self.key, why }
-    }
-
-    fn matrix3(&self) -> Result<Matrix3<f64>, RigYamlError> {
-        if (self.rows, self.cols) == (3, 3) { Ok(Matrix3::from_row_slice(&self.values)) } else { Err(self.shape("3 x 3")) }
-    }
-
-    fn vector3(&self) -> Result<Vector3<f64>, RigYamlError> {
-        if self.values.len() == 3 { Ok(Vector3::from_column_slice(&self.values)) } else { Err(self.shape("3 x 1")) }
-    }
-
-    fn rotation(&self) -> Result<Matrix3<f64>, RigYamlError> {
-        let m = self.matrix3()?;
-        let off = (m * m.transpose() - Matrix3::identity()).abs().max();
-        if off > ROTATION_TOLERANCE || m.determinant() <= 0.0 {
-            return Err(self.value("must be a rotation: orthonormal, determinant 1"));
-        }
-        Ok(m)
-    }
-}
-
-/// Cuts a `#` comment off, quotes respected.
-fn without_comment(line: &str) -> &str {
-    let mut quoted = false;
-    for (at, c) in line.char_indices() {
-        match c {
-            '"' => quoted = !quoted,
-            '#' if !quoted => return line[..at].trim_end(),
-            _ => {}
-        }
-    }
-    line.trim_end()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::stereo::CameraIntrinsics;
     use proptest::prelude::*;
 
     /// Written by hand after the layout in OpenCV's FileStorage documentation: wrapped data, `1.`, a comment, a foreign key.
@@ -370,7 +187,7 @@ mod tests {
         check("[ 640, 480 ]", "[ 640 ]", "line 4: image_size is 1 x 1, expected 2 numbers: width, height");
         check("5.0e+02, 0., 3.2e+02", ".Nan, 0., 3.2e+02", "line 5: M1 has \".Nan\", expected a finite number");
         check("5.0e+02, 0., 3.2e+02", "-5.0e+02, 0., 3.2e+02", "line 5: M1 must have positive focal lengths");
-        check("5.0e+02, 0., 3.2e+02", "5.0e+02, 0.", "line 5: expected rows and cols that fit the data of an opencv-matrix");
+        check("5.0e+02, 0., 3.2e+02", "5.0e+02, 0.", "line 5: expected rows and cols that fit the data of a matrix");
         check(
             "[ 1., 0., 0., 0., 0., -1.,",
             "[ 1., 0., 0., 0., 0., 1.,",

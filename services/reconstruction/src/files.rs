@@ -17,12 +17,14 @@ mod decode;
 mod glob;
 mod grey;
 mod pnm;
+mod rig;
 mod truth;
 
 pub use container::PictureKind;
 use container::Trouble;
 pub use glob::{GlobError, glob};
 pub use grey::{Grey, Samples};
+pub use rig::{RigFileError, read_rig, write_rig, write_ros};
 pub use truth::read_truth;
 
 /// Larger files are no pictures of a stereo rig.

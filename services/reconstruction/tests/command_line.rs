@@ -11,38 +11,63 @@ mod support;
 
 use std::path::Path;
 
-use halcyon_reconstruction::cli::{self, CalibrateCliError, MatchCliError, MatchOptions};
-use halcyon_reconstruction::core::calibrate::CalibrateError;
+use halcyon_model::Image;
+use halcyon_reconstruction::cli::{self, CalibrateCliError, CalibrateRequest, MatchCliError, MatchOptions};
+use halcyon_reconstruction::core::calibrate::{CalibrateError, Options};
 use halcyon_reconstruction::core::disparity::{Disparity, pfm};
 use halcyon_reconstruction::core::matcher::{Engine, StudyMethod};
-use halcyon_reconstruction::files::{FileError, read_picture};
+use halcyon_reconstruction::files::{FileError, RigFileError, read_picture, read_rig};
 use support::samples;
 
 fn sample_glob(side: &str) -> String {
     samples().join(format!("{side}??.jpg")).to_string_lossy().into_owned()
 }
 
+fn request<'a>(left: &'a str, right: &'a str, board: &'a str, out: Option<&'a Path>) -> CalibrateRequest<'a> {
+    CalibrateRequest { left, right, board, square_m: 0.025, options: Options::default(), out, ros: None }
+}
+
 fn calibrate(left: &str, right: &str, board: &str, out: Option<&Path>) -> Result<cli::CalibrateReport, CalibrateCliError> {
-    cli::calibrate(left, right, board, 0.025, out, &mut |_, _| {})
+    cli::calibrate(&request(left, right, board, out), &mut |_, _| {}).map(|(report, _)| report)
 }
 
 #[test]
 fn calibrate_writes_a_rig_that_reads_back() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("rig.yaml");
+    let ros = folder.path().join("made/ros");
     let mut steps = Vec::new();
-    let report = cli::calibrate(&sample_glob("left"), &sample_glob("right"), "9x6", 0.025, Some(&out), &mut |done, total| {
-        steps.push((done, total));
-    })
-    .unwrap();
+    let (left, right) = (sample_glob("left"), sample_glob("right"));
+    let request = CalibrateRequest { ros: Some(&ros), ..request(&left, &right, "9x6", Some(&out)) };
+    let (report, calibration) = cli::calibrate(&request, &mut |done, total| steps.push((done, total))).unwrap();
     assert_eq!(steps, (1..=13).map(|done| (done, 13)).collect::<Vec<_>>());
-    assert!(report.stereo_rms_px <= 0.46, "{report:?}");
+    assert!(report.stereo_rms_px <= 0.2, "{report:?}");
     assert!(report.views[0].left.ends_with("left01.jpg") && report.views[12].right.ends_with("right14.jpg"));
     let rig = halcyon_model::rig_yaml::parse(&std::fs::read_to_string(&out).unwrap()).unwrap();
     assert_eq!((rig.width_px, rig.height_px), (640, 480));
     assert_eq!(rig.left.fx_px, report.left.fx_px);
     assert_eq!(rig.baseline_m(), report.baseline_m);
+    assert_eq!(read_rig(&out).unwrap(), calibration.rig);
+    // Through ROS's two files, and from there back to OpenCV's one.
+    let back = folder.path().join("back.yaml");
+    cli::convert_rig(&ros, Some(&back), None).unwrap();
+    let through = read_rig(&back).unwrap();
+    assert_eq!((through.left, through.right), (rig.left, rig.right));
+    assert!((through.right_from_left - rig.right_from_left).norm() < 1e-12, "{}", through.right_from_left);
+    assert!((through.right_from_left_m - rig.right_from_left_m).norm() < 1e-12, "{}", through.right_from_left_m);
+
     let json = serde_json::to_value(&report).unwrap();
+    let low_value_high = |of: &serde_json::Value, key: &str| {
+        let number = |key: String| of[&key].as_f64().unwrap_or_else(|| panic!("{key}"));
+        (number(format!("{key}_low")), number(key.to_owned()), number(format!("{key}_high")))
+    };
+    for (of, key) in [(&json, "baseline_m"), (&json["left"], "fx_px"), (&json["right"], "cy_px")] {
+        let (low, value, high) = low_value_high(of, key);
+        assert!(low < value && value < high && high - low < 0.05 * value, "{key} {low} {value} {high}");
+    }
+    assert_eq!(json["error_by_views"].as_array().unwrap().len(), 11);
+    assert_eq!(json["left"]["coverage_map"]["counts"].as_array().unwrap().len(), 48);
+    assert!(json["board_warp_m"].is_array() && json["depth_uncertainty"]["median_m"].is_number());
     for key in [
         "views_total",
         "views_used",
@@ -82,20 +107,55 @@ fn bad_input_to_calibrate_is_named() {
         "{too_few:?}"
     );
     let other_board = calibrate(&first("left"), &first("right"), "8x5", None);
-    let seen = |seen_cols, seen_rows| (seen_cols, seen_rows) == (9, 6) || (seen_cols, seen_rows) == (6, 9);
     match other_board {
         Err(CalibrateCliError::Calibrate(CalibrateError::WrongBoard { cols: 8, rows: 5, seen_cols, seen_rows })) => {
-            assert!(seen(seen_cols, seen_rows));
+            assert_eq!((seen_cols, seen_rows), (9, 6));
         }
         other => panic!("{other:?}"),
     }
+    // A part of the board is found in most pictures, and is not the board.
+    for (side, i) in ["left", "right"].into_iter().flat_map(|side| [3, 6, 7, 8].map(|i| (side, i))) {
+        let name = format!("{side}{i:02}.jpg");
+        std::fs::copy(samples().join(&name), folder.path().join(&name)).unwrap();
+    }
+    let few = |side: &str| folder.path().join(format!("{side}0?.jpg")).to_string_lossy().into_owned();
+    let part = calibrate(&few("left"), &few("right"), "8x6", None);
+    assert!(
+        matches!(part, Err(CalibrateCliError::Calibrate(CalibrateError::WrongBoard { seen_cols: 9, seen_rows: 6, .. }))),
+        "{part:?}"
+    );
     let mixed = calibrate(&first("left"), &samples().join("aloeL.jpg").to_string_lossy(), "9x6", None);
     assert!(matches!(mixed, Err(CalibrateCliError::Calibrate(CalibrateError::MixedSizes { view: 0, .. }))));
     let blank = write_pgm(folder.path(), "blank.pgm", 64, 48, &vec![90; 64 * 48]);
     let no_board = calibrate(&blank, &blank, "9x6", None);
     assert!(matches!(no_board, Err(CalibrateCliError::Calibrate(CalibrateError::NoBoard { pictures: 2, .. }))), "{no_board:?}");
-    let nowhere_to_write = calibrate(&left, &right, "9x6", Some(Path::new("/nowhere/rig.yaml")));
+    for square_m in [f64::NAN, 0.0, -1.0, f64::INFINITY] {
+        let refused = cli::calibrate(&CalibrateRequest { square_m, ..request(&left, &right, "9x6", None) }, &mut |_, _| {});
+        assert!(matches!(refused, Err(CalibrateCliError::Calibrate(CalibrateError::Board { .. }))), "{square_m}");
+    }
+    let with_itself = calibrate(&left, &left, "9x6", None);
+    assert!(
+        matches!(with_itself, Err(CalibrateCliError::Calibrate(CalibrateError::SamePicture { first: 0, second: 0, .. }))),
+        "{with_itself:?}"
+    );
+    let text = folder.path().join("text.jpg");
+    std::fs::write(&text, "no picture").unwrap();
+    let text = calibrate(text.to_str().unwrap(), &first("right"), "9x6", None);
+    assert!(matches!(text, Err(CalibrateCliError::File(FileError::NotAPicture { .. }))), "{text:?}");
+    let nowhere_to_write = calibrate(&few("left"), &few("right"), "9x6", Some(Path::new("/nowhere/rig.yaml")));
     assert!(matches!(nowhere_to_write, Err(CalibrateCliError::File(FileError::Write { .. }))));
+}
+
+#[test]
+fn a_file_that_is_no_calibration_is_named_with_its_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("rig.yaml");
+    std::fs::write(&file, [0xff, 0xfe, 0, b'\n']).unwrap();
+    for path in [file.as_path(), folder.path(), Path::new("/nowhere/rig.yaml")] {
+        let refused = cli::convert_rig(path, None, None).unwrap_err();
+        assert!(matches!(refused, CalibrateCliError::Rig(RigFileError::Content { .. } | RigFileError::File(_))), "{refused:?}");
+        assert_eq!(refused.to_string().lines().count(), 1, "{refused}");
+    }
 }
 
 fn write_pgm(folder: &Path, name: &str, width: u32, height: u32, pixels: &[u8]) -> String {

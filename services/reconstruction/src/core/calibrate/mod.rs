@@ -1,109 +1,71 @@
-//! Calibrates a rig from checkerboard pairs (thesis chapter 3): intrinsics, distortion and the pose of the right camera.
+//! Calibrates a rig from checkerboard pairs (thesis chapter 3): intrinsics, distortion and the pose of the right camera, how well
+//! each is known, and what that means for depth.
+//!
+//! Corners are found by OpenCV, each camera alone is calibrated by OpenCV (Zhang's method), and from there on a bundle
+//! adjustment of our own takes both cameras, the rig, every board pose and the board's warp together.
 
 mod agreement;
 mod board;
+mod bundle;
+mod by_views;
 mod check;
+mod coverage;
+mod error;
 mod fit;
+mod look;
+mod model;
+mod rows;
 mod sighting;
+mod start;
 #[cfg(test)]
 mod tests;
+mod uncertainty;
 
 pub use board::BoardSpec;
-pub use check::RowError;
-pub use fit::DistortionModel;
-use fit::{Points, RigFit};
-use halcyon_model::{CameraIntrinsics, Image, RigCalibration};
-use nalgebra::Vector3;
+pub use by_views::ErrorByViews;
+pub use coverage::CoverageMap;
+pub use error::CalibrateError;
+pub use model::DistortionModel;
+pub use rows::{RowError, camera_infos};
 pub use sighting::ViewProblem;
-use sighting::{Residuals, Sighting};
+pub use uncertainty::{DepthUncertainty, SIGMAS_95, Sigmas, rotation_vector_rad};
+
+use bundle::{Free, Guess, Scene, covariance, minimise};
+use fit::{RigFit, Search};
+use halcyon_model::{Image, RigCalibration};
+use nalgebra::{Rotation3, Vector2, Vector3};
+use opencv::core::Point2f;
+use sighting::{Residuals, Side, Sighting};
+use start::Cameras;
 
 /// The fewest views that fix both cameras.
 pub const VIEWS_MIN: usize = 3;
 /// At most this share of the corners is ever rejected as outliers; more means that something else is wrong.
 const CORNERS_REJECTED_MAX: f64 = 0.03;
-/// Rounds of leaving out corners: after the first few nothing new turns up.
-const CORNER_ROUNDS: u32 = 6;
+/// Rounds of leaving out corners; each takes at most one of every view.
+const CORNER_ROUNDS: u32 = 50;
 
-/// Why there is no calibration.
-#[derive(Debug, thiserror::Error)]
-pub enum CalibrateError {
-    /// No such board.
-    #[error("a board needs 3 to 64 inner corners a side and squares wider than 0 m, not {cols}x{rows} of {square_m} m")]
-    Board {
-        /// Inner corners along a row.
-        cols: u32,
-        /// Inner corners along a column.
-        rows: u32,
-        /// Side of a square, metres.
-        square_m: f64,
-    },
-    /// Pictures of different sizes.
-    #[error(
-        "pair {} has pictures of {left_width_px}x{left_height_px} and {right_width_px}x{right_height_px} px, the first left one \
-         has {width_px}x{height_px}: all must be of one size",
-        view + 1
-    )]
-    MixedSizes {
-        /// The first pair that differs, from 0.
-        view: usize,
-        /// Its left picture's width.
-        left_width_px: u32,
-        /// Its left picture's height.
-        left_height_px: u32,
-        /// Its right picture's width.
-        right_width_px: u32,
-        /// Its right picture's height.
-        right_height_px: u32,
-        /// What the first left picture has.
-        width_px: u32,
-        /// What the first left picture has.
-        height_px: u32,
-    },
-    /// No board anywhere.
-    #[error("no board of {cols}x{rows} inner corners was found in any of {pictures} pictures")]
-    NoBoard {
-        /// Inner corners along a row, as asked.
-        cols: u32,
-        /// Inner corners along a column, as asked.
-        rows: u32,
-        /// How many were searched.
-        pictures: usize,
-    },
-    /// A board, but another one.
-    #[error("no board of {cols}x{rows} inner corners was found; the pictures seem to show one of {seen_cols}x{seen_rows}")]
-    WrongBoard {
-        /// Inner corners along a row, as asked.
-        cols: u32,
-        /// Inner corners along a column, as asked.
-        rows: u32,
-        /// What a picture shows.
-        seen_cols: u32,
-        /// What a picture shows.
-        seen_rows: u32,
-    },
-    /// Too few views to fix the cameras.
-    #[error(
-        "{usable} of {views} pairs can be used (the board seen whole on both sides, and left agreeing with right); at least {VIEWS_MIN} are needed"
-    )]
-    TooFewViews {
-        /// Pairs given.
-        views: usize,
-        /// Pairs that can be used.
-        usable: usize,
-    },
-    /// Views that do not fix a camera.
-    #[error("{views} views do not determine the cameras: show the board tilted in several directions, near and far")]
-    Degenerate {
-        /// Views that were tried.
-        views: usize,
-    },
-    /// OpenCV failed in a way that none of the above explains.
-    #[error("OpenCV failed during calibration")]
-    OpenCv(#[from] opencv::Error),
+/// What a calibration is asked to do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// Take the board for flat; otherwise its warp is estimated where the data earn it.
+    pub flat_board: bool,
+    /// How many starts the joint search is given.
+    pub starts: usize,
+    /// Depth that the map of uncertainty is for, metres.
+    pub depth_at_m: f64,
+    /// Seed of the starts and of the subsets of [`ErrorByViews`].
+    pub seed: u64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { flat_board: false, starts: 12, depth_at_m: 1.0, seed: 1 }
+    }
 }
 
 /// How one view did.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ViewQuality {
     /// Why it takes no part, or `None` where it does.
     pub problem: Option<ViewProblem>,
@@ -113,6 +75,26 @@ pub struct ViewQuality {
     pub right_error_px: f64,
     /// Root mean square of both, pixels.
     pub rms_px: f64,
+    /// Corners left out of the left and the right picture.
+    pub corners_rejected: [usize; 2],
+    /// Seen minus predicted of every corner of the left picture, pixels, row-major; empty where no board was found.
+    pub left_residuals_px: Vec<Vector2<f64>>,
+    /// The same of the right picture.
+    pub right_residuals_px: Vec<Vector2<f64>>,
+}
+
+impl ViewQuality {
+    fn without_board(problem: Option<ViewProblem>) -> Self {
+        Self {
+            problem,
+            left_error_px: f64::NAN,
+            right_error_px: f64::NAN,
+            rms_px: f64::NAN,
+            corners_rejected: [0, 0],
+            left_residuals_px: Vec::new(),
+            right_residuals_px: Vec::new(),
+        }
+    }
 }
 
 /// A calibrated rig, and how far it can be trusted.
@@ -122,15 +104,23 @@ pub struct Calibration {
     pub rig: RigCalibration,
     /// The distortion model that the data earned.
     pub model: DistortionModel,
+    /// The board's warp: how far the middle of its columns and of its rows stands out towards +z of the board (away from the
+    /// cameras), metres. `None` where it was taken for flat, or no warp was earned.
+    pub board_warp_m: Option<Vector2<f64>>,
+    /// Standard deviations of all of these.
+    pub sigmas: Sigmas,
+    /// What they mean for depth.
+    pub depth: DepthUncertainty,
     /// Every given pair, in order.
     pub views: Vec<ViewQuality>,
-    /// Corners seen in the pairs where both boards were found; each counts once for left and right together.
+    /// Corners seen in the pairs where both boards were found, each counted once left and once right.
     pub corners_total: usize,
-    /// Of those, the ones left out as outliers, and those of views left out.
+    /// Of those, the ones left out as outliers, and all of views left out.
     pub corners_rejected: usize,
-    /// Root mean square distance from seen to predicted corner over both cameras and the corners used, pixels.
+    /// Root mean square **distance** from seen to predicted corner over both cameras and the corners used, pixels: what OpenCV's
+    /// `stereoCalibrate` returns.
     pub stereo_rms_px: f64,
-    /// The same before any corner or view was left out.
+    /// The same before any corner or view was left out, with a flat board.
     pub stereo_rms_all_px: f64,
     /// The left camera's part of `stereo_rms_px`.
     pub left_rms_px: f64,
@@ -140,22 +130,24 @@ pub struct Calibration {
     pub mean_error_px: f64,
     /// What is left of the vertical disparity after rectification.
     pub row_error: RowError,
-    /// Share of the left picture, in 8 × 6 fields, in which a corner was seen.
-    pub coverage_left: f64,
-    /// Share of the right picture.
-    pub coverage_right: f64,
+    /// Where in the left picture corners were seen.
+    pub coverage_left: CoverageMap,
+    /// Where in the right picture.
+    pub coverage_right: CoverageMap,
+    /// Error against the number of views (thesis figure 3-7).
+    pub error_by_views: Vec<ErrorByViews>,
     /// Starts of the joint search with the chosen model.
-    pub starts: u32,
+    pub starts: usize,
     /// Of those, how many ended at the best solution. 1 of several is a reason for doubt.
-    pub starts_agreeing: u32,
+    pub starts_agreeing: usize,
 }
 
-/// [`calibrate_with`] without progress.
+/// [`calibrate_with`] with default options and without progress.
 ///
 /// # Errors
 /// As [`calibrate_with`].
 pub fn calibrate(views: &[(Image, Image)], board: BoardSpec) -> Result<Calibration, CalibrateError> {
-    calibrate_with(views, board, &mut |_, _| {})
+    calibrate_with(views, board, &Options::default(), &mut |_, _| {})
 }
 
 /// Calibrates a rig from pairs of pictures (left, right) of `board`, taken at the same instant each.
@@ -163,118 +155,123 @@ pub fn calibrate(views: &[(Image, Image)], board: BoardSpec) -> Result<Calibrati
 /// `progress` is told how many of all pairs have been searched for corners.
 ///
 /// # Errors
-/// [`CalibrateError`] where pictures differ in size, the board is nowhere or another one, fewer than [`VIEWS_MIN`] pairs can
-/// be used, or the views do not determine the cameras.
+/// [`CalibrateError`] where pictures differ in size or are given twice, the board is nowhere or another one, fewer than
+/// [`VIEWS_MIN`] pairs can be used, left and right are swapped, or the views do not determine the cameras.
 pub fn calibrate_with(
     views: &[(Image, Image)],
     board: BoardSpec,
+    options: &Options,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<Calibration, CalibrateError> {
-    let size = common_size(views)?;
-    let (mut sightings, mut quality) = look(views, &board, progress)?;
+    let size = look::common_size(views)?;
+    look::require_different(views)?;
+    let (sightings, quality) = look::look(views, &board, progress)?;
     if sightings.len() < VIEWS_MIN {
-        return Err(explain_missing(views, &board, sightings.len())?);
+        return Err(look::explain_missing(views, &board, sightings.len())?);
     }
-    let degenerate = || CalibrateError::Degenerate { views: sightings.len() };
-    let alone = Points::new(&sightings, &board, size).cameras(DistortionModel::Radial2)?.ok_or_else(degenerate)?;
-    agreement::settle(&mut sightings, &board, &alone.0, &alone.1)?;
-    require_views(&sightings, views.len())?;
+    look::require_whole(views, &board, &sightings)?;
+    calibrate_sightings(sightings, quality, &board, size, options)
+}
 
-    let (first, _) = solve(&sightings, &board, size)?;
-    let stereo_rms_all_px = first.rms_px;
-    let (fit, residuals) = reject_outliers(&mut sightings, &board, size, first)?;
+/// Where both cameras saw the corners of a board, pixels, in the board's row-major order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CornerPair {
+    /// In the left picture.
+    pub left: Vec<Vector2<f64>>,
+    /// In the right picture.
+    pub right: Vec<Vector2<f64>>,
+}
+
+/// Calibrates from corners that are known already, of another detector or of a simulation; `size` is the pictures' width and
+/// height, pixels.
+///
+/// # Errors
+/// As [`calibrate_with`], and [`CalibrateError::Corners`] where a view has not one finite pixel for each corner.
+pub fn calibrate_corners(
+    views: &[CornerPair],
+    board: BoardSpec,
+    size: (u32, u32),
+    options: &Options,
+) -> Result<Calibration, CalibrateError> {
+    let mut sightings = Vec::with_capacity(views.len());
+    for (view, pair) in views.iter().enumerate() {
+        let expected = board.corners();
+        let finite = pair.left.iter().chain(&pair.right).all(|pixel| pixel.iter().all(|at| at.is_finite()));
+        if pair.left.len() != expected || pair.right.len() != expected || !finite {
+            return Err(CalibrateError::Corners { view, left: pair.left.len(), right: pair.right.len(), expected });
+        }
+        let points = |pixels: &[Vector2<f64>]| pixels.iter().map(|p| Point2f::new(p.x as f32, p.y as f32)).collect();
+        sightings.push(Sighting::new(view, points(&pair.left), points(&pair.right)));
+    }
     require_views(&sightings, views.len())?;
+    calibrate_sightings(sightings, vec![ViewQuality::without_board(None); views.len()], &board, size, options)
+}
+
+fn calibrate_sightings(
+    mut sightings: Vec<Sighting>,
+    mut quality: Vec<ViewQuality>,
+    board: &BoardSpec,
+    size: (u32, u32),
+    options: &Options,
+) -> Result<Calibration, CalibrateError> {
+    let distance_m = options.depth_at_m;
+    if !(distance_m.is_finite() && distance_m > 0.0) {
+        return Err(CalibrateError::Distance { distance_m });
+    }
+    let found = sightings.len();
+    let degenerate = || CalibrateError::Degenerate { views: found };
+    let alone = start::alone(&sightings, board, size)?.ok_or_else(degenerate)?;
+    agreement::settle(&mut sightings, board, &alone.0, &alone.1)?;
+    require_views(&sightings, quality.len())?;
+
+    let work = Work { board, size, options };
+    let plain = work.plain(&sightings, alone)?.ok_or_else(degenerate)?;
+    let (fit, residuals) = work.reject_outliers(&mut sightings, &plain)?.ok_or_else(degenerate)?;
+    require_views(&sightings, quality.len())?;
+    let (search, residuals) = work.verify(&sightings, alone, fit, residuals)?;
+    let fit = search.best;
+
+    let scene = Scene::new(&sightings, board);
+    let rig = rig_from_guess(&fit.solved.guess, size);
+    let baseline_m = rig.baseline_m();
+    let centre_m = -(rig.right_from_left.transpose() * rig.right_from_left_m);
+    if centre_m.x < 0.0 && centre_m.x.abs() > centre_m.y.abs() {
+        return Err(CalibrateError::Swapped { baseline_m });
+    }
+    let covariance = covariance(&scene, &fit.solved, &fit.free()).ok_or_else(degenerate)?;
 
     for (sighting, residuals) in sightings.iter().zip(&residuals) {
-        let (left, right) = (mean_error_px(sighting, &residuals.left), mean_error_px(sighting, &residuals.right));
-        let rms_px = check::rms_px(std::iter::once((sighting, residuals)), check::Side::Both);
-        quality[sighting.view] = ViewQuality { problem: sighting.problem, left_error_px: left, right_error_px: right, rms_px };
+        quality[sighting.view] = view_quality(sighting, residuals);
     }
     let used = || sightings.iter().zip(&residuals).filter(|(sighting, _)| sighting.is_used());
-    let corners_total = sightings.len() * board.corners();
-    let corners_used: usize = used().map(|(sighting, _)| sighting.kept_corners().count()).sum();
+    let corners_total = 2 * sightings.len() * board.corners();
+    let corners_used: usize = used().map(|(sighting, _)| sighting.kept_count()).sum();
     let errors: Vec<f64> = quality
         .iter()
         .filter(|view| view.problem.is_none())
         .map(|view| (view.left_error_px + view.right_error_px) / 2.0)
         .collect();
     Ok(Calibration {
-        rig: rig_from_fit(&fit, size),
+        rig,
         model: fit.model,
+        board_warp_m: fit.warp.then_some(fit.solved.guess.warp_m),
+        sigmas: Sigmas::new(&rig, &covariance),
+        depth: DepthUncertainty::new(&rig, &covariance, distance_m),
         corners_total,
         corners_rejected: corners_total - corners_used,
         stereo_rms_px: fit.rms_px,
-        stereo_rms_all_px,
-        left_rms_px: check::rms_px(used(), check::Side::Left),
-        right_rms_px: check::rms_px(used(), check::Side::Right),
+        stereo_rms_all_px: plain.rms_px,
+        left_rms_px: check::rms_px(used(), &[Side::Left]),
+        right_rms_px: check::rms_px(used(), &[Side::Right]),
         mean_error_px: errors.iter().sum::<f64>() / errors.len() as f64,
-        row_error: check::row_error(&fit, &sightings, size)?,
-        coverage_left: check::coverage(sightings.iter().map(|sighting| (sighting, &sighting.left)), size),
-        coverage_right: check::coverage(sightings.iter().map(|sighting| (sighting, &sighting.right)), size),
-        starts: fit.starts,
-        starts_agreeing: fit.starts_agreeing,
+        row_error: rows::row_error(&rig, &sightings)?,
+        coverage_left: CoverageMap::new(&sightings, Side::Left, size),
+        coverage_right: CoverageMap::new(&sightings, Side::Right, size),
+        error_by_views: by_views::error_by_views(&scene, &fit, size, options.seed),
+        starts: search.starts,
+        starts_agreeing: search.agreeing,
         views: quality,
     })
-}
-
-/// The size that all pictures share.
-fn common_size(views: &[(Image, Image)]) -> Result<(u32, u32), CalibrateError> {
-    let Some((first, _)) = views.first() else { return Err(CalibrateError::TooFewViews { views: 0, usable: 0 }) };
-    let (width_px, height_px) = (first.width_px(), first.height_px());
-    let differs = |image: &Image| (image.width_px(), image.height_px()) != (width_px, height_px);
-    match views.iter().position(|(left, right)| differs(left) || differs(right)) {
-        None => Ok((width_px, height_px)),
-        Some(view) => Err(CalibrateError::MixedSizes {
-            view,
-            left_width_px: views[view].0.width_px(),
-            left_height_px: views[view].0.height_px(),
-            right_width_px: views[view].1.width_px(),
-            right_height_px: views[view].1.height_px(),
-            width_px,
-            height_px,
-        }),
-    }
-}
-
-/// Searches every picture for the board.
-fn look(
-    views: &[(Image, Image)],
-    board: &BoardSpec,
-    progress: &mut dyn FnMut(usize, usize),
-) -> Result<(Vec<Sighting>, Vec<ViewQuality>), CalibrateError> {
-    let mut sightings = Vec::new();
-    let mut quality = Vec::with_capacity(views.len());
-    for (view, (left, right)) in views.iter().enumerate() {
-        let problem = match (board::find(left, board)?, board::find(right, board)?) {
-            (Some(left), Some(right)) => {
-                sightings.push(Sighting::new(view, left, right));
-                None
-            }
-            (None, Some(_)) => Some(ViewProblem::NotFoundLeft),
-            (Some(_), None) => Some(ViewProblem::NotFoundRight),
-            (None, None) => Some(ViewProblem::NotFound),
-        };
-        quality.push(ViewQuality { problem, left_error_px: f64::NAN, right_error_px: f64::NAN, rms_px: f64::NAN });
-        progress(view + 1, views.len());
-    }
-    Ok((sightings, quality))
-}
-
-/// Too few views have the board: because it is another one, because there is none, or just so.
-fn explain_missing(views: &[(Image, Image)], board: &BoardSpec, usable: usize) -> Result<CalibrateError, CalibrateError> {
-    let (cols, rows) = (board.cols(), board.rows());
-    if usable > 0 {
-        return Ok(CalibrateError::TooFewViews { views: views.len(), usable });
-    }
-    // A few pictures tell; all of them would take long for nothing.
-    for (left, _) in views.iter().take(5) {
-        if let Some((seen_cols, seen_rows)) = board::find_any(left)?
-            && (seen_cols, seen_rows) != (cols, rows)
-        {
-            return Ok(CalibrateError::WrongBoard { cols, rows, seen_cols, seen_rows });
-        }
-    }
-    Ok(CalibrateError::NoBoard { cols, rows, pictures: 2 * views.len() })
 }
 
 fn require_views(sightings: &[Sighting], views: usize) -> Result<(), CalibrateError> {
@@ -282,59 +279,132 @@ fn require_views(sightings: &[Sighting], views: usize) -> Result<(), CalibrateEr
     if usable < VIEWS_MIN { Err(CalibrateError::TooFewViews { views, usable }) } else { Ok(()) }
 }
 
-fn solve(sightings: &[Sighting], board: &BoardSpec, size: (u32, u32)) -> Result<(RigFit, Vec<Residuals>), CalibrateError> {
-    let used = sightings.iter().filter(|sighting| sighting.is_used()).count();
-    let fit = Points::new(sightings, board, size).solve()?.ok_or(CalibrateError::Degenerate { views: used })?;
-    let residuals = sightings.iter().map(|sighting| sighting.residuals(&fit, board)).collect::<Result<_, _>>()?;
-    Ok((fit, residuals))
-}
-
-/// Leaves out views and corners that do not belong, one view or one round of corners at a time, and solves again in between.
-fn reject_outliers(
-    sightings: &mut [Sighting],
-    board: &BoardSpec,
+/// What every step of one calibration needs.
+struct Work<'a> {
+    board: &'a BoardSpec,
     size: (u32, u32),
-    first: RigFit,
-) -> Result<(RigFit, Vec<Residuals>), CalibrateError> {
-    let residuals_of = |sightings: &[Sighting], fit: &RigFit| -> Result<Vec<Residuals>, CalibrateError> {
-        Ok(sightings.iter().map(|sighting| sighting.residuals(fit, board)).collect::<Result<_, _>>()?)
-    };
-    let mut residuals = residuals_of(sightings, &first)?;
-    let mut fit = first;
-    let mut corner_rounds = 0;
-    let mut went = false;
-    // Ends: each round takes out a view, of which half stay, or is one of a few rounds of corners.
-    loop {
-        let view_went = check::reject_worst_view(sightings, &residuals);
-        if !view_went {
-            if corner_rounds == CORNER_ROUNDS || !check::reject_corners(sightings, &residuals, CORNERS_REJECTED_MAX) {
-                break;
-            }
-            corner_rounds += 1;
-        }
-        went = true;
-        let used = sightings.iter().filter(|sighting| sighting.is_used()).count();
-        fit = Points::new(sightings, board, size).refine(&fit)?.ok_or(CalibrateError::Degenerate { views: used })?;
-        residuals = residuals_of(sightings, &fit)?;
+    options: &'a Options,
+}
+
+impl Work<'_> {
+    /// The best of many starts with everything that was seen and a flat board; `None` where the views do not determine it.
+    fn plain(&self, sightings: &[Sighting], alone: Cameras) -> Result<Option<RigFit>, CalibrateError> {
+        let starts = start::cameras(alone, self.size, self.options.starts.max(1), self.options.seed);
+        let simple = (DistortionModel::Radial2, false);
+        let Some(search) = fit::search(sightings, self.board, self.size, &starts, simple)? else { return Ok(None) };
+        let scene = Scene::new(sightings, self.board);
+        Ok(fit::choose(&scene, &search.best.solved.guess, false, self.size))
     }
-    // What went may have been what a richer model was for.
-    if went { solve(sightings, board, size) } else { Ok((fit, residuals)) }
+
+    /// Leaves out views and corners that do not belong, one view or one round of corners at a time, and solves again in between.
+    /// The board's warp is free already: a warped board makes good corners look bad.
+    fn reject_outliers(
+        &self,
+        sightings: &mut [Sighting],
+        plain: &RigFit,
+    ) -> Result<Option<(RigFit, Vec<Residuals>)>, CalibrateError> {
+        let scene = Scene::new(sightings, self.board);
+        let may_warp = !self.options.flat_board;
+        let Some(mut fit) = fit::choose(&scene, &plain.solved.guess, may_warp, self.size) else { return Ok(None) };
+        let mut residuals = self.residuals(sightings, &fit.solved.guess)?;
+        let mut corner_rounds = 0;
+        // Ends: each round takes out a view, of which half stay, or is one of a few rounds of corners.
+        loop {
+            let before: Vec<bool> = sightings.iter().map(Sighting::is_used).collect();
+            if !check::reject_worst_view(sightings, &residuals) {
+                if corner_rounds == CORNER_ROUNDS || !check::reject_corners(sightings, &residuals, CORNERS_REJECTED_MAX) {
+                    break;
+                }
+                corner_rounds += 1;
+            }
+            let mut from = fit.solved.guess.clone();
+            let mut used = before.iter().zip(sightings.iter()).filter(|(before, _)| **before).map(|(_, now)| now.is_used());
+            from.poses.retain(|_| used.next().unwrap_or(false));
+            let Some(next) = fit.again(&Scene::new(sightings, self.board), &from, self.size) else { return Ok(None) };
+            fit = next;
+            residuals = self.residuals(sightings, &fit.solved.guess)?;
+        }
+        // What went may have been what a richer model was for.
+        let scene = Scene::new(sightings, self.board);
+        let Some(fit) = fit::choose(&scene, &fit.solved.guess, may_warp, self.size) else { return Ok(None) };
+        let residuals = self.residuals(sightings, &fit.solved.guess)?;
+        Ok(Some((fit, residuals)))
+    }
+
+    /// The final model once more from many starts; takes what is better, should there be any.
+    fn verify(
+        &self,
+        sightings: &[Sighting],
+        alone: Cameras,
+        fit: RigFit,
+        residuals: Vec<Residuals>,
+    ) -> Result<(Search, Vec<Residuals>), CalibrateError> {
+        let starts = start::cameras(alone, self.size, self.options.starts.max(1), self.options.seed.wrapping_add(1));
+        let search = fit::search(sightings, self.board, self.size, &starts, (fit.model, fit.warp))?;
+        match search {
+            Some(search) if search.best.rms_px < fit.rms_px * (1.0 - fit::SAME_END) => {
+                let residuals = self.residuals(sightings, &search.best.solved.guess)?;
+                Ok((search, residuals))
+            }
+            Some(search) => Ok((Search { best: fit, ..search }, residuals)),
+            None => Ok((Search { best: fit, starts: starts.len(), agreeing: 0 }, residuals)),
+        }
+    }
+
+    /// Of every view; one that takes no part gets the board pose that suits it best.
+    fn residuals(&self, sightings: &[Sighting], guess: &Guess) -> Result<Vec<Residuals>, CalibrateError> {
+        let mut poses = guess.poses.iter();
+        let mut all = Vec::with_capacity(sightings.len());
+        for sighting in sightings {
+            let pose = match sighting.is_used() {
+                true => poses.next().copied(),
+                false => self.place(sighting, guess)?,
+            };
+            all.push(match pose {
+                Some(pose) => sighting.residuals(self.board, guess, &pose),
+                None => Residuals::unknown(sighting.left.len()),
+            });
+        }
+        Ok(all)
+    }
+
+    fn place(&self, sighting: &Sighting, guess: &Guess) -> Result<Option<sighting::Pose>, CalibrateError> {
+        let Some(pose) = sighting::Pose::of_board(self.board, &sighting.left, &guess.left)? else { return Ok(None) };
+        let scene = Scene { board: *self.board, views: vec![bundle::View::new(sighting)] };
+        let placed = minimise(&scene, &Guess { poses: vec![pose], ..guess.clone() }, &Free::POSES);
+        Ok(Some(placed.map_or(pose, |placed| placed.guess.poses[0])))
+    }
 }
 
-fn mean_error_px(sighting: &Sighting, residuals: &[nalgebra::Vector2<f64>]) -> f64 {
-    let (sum, count) = sighting.kept_corners().fold((0.0, 0), |(sum, count), i| (sum + residuals[i].norm(), count + 1));
-    sum / f64::from(count)
+fn view_quality(sighting: &Sighting, residuals: &Residuals) -> ViewQuality {
+    let mean = |side: Side| {
+        let (sum, count) =
+            sighting.kept(side).fold((0.0, 0), |(sum, count), i| (sum + residuals.of(side)[i].norm(), count + 1));
+        sum / f64::from(count)
+    };
+    let rejected = |side: Side| sighting.keep(side).iter().filter(|keep| !**keep).count();
+    ViewQuality {
+        problem: sighting.problem,
+        left_error_px: mean(Side::Left),
+        right_error_px: mean(Side::Right),
+        rms_px: check::rms_px(std::iter::once((sighting, residuals)), &Side::BOTH),
+        corners_rejected: [rejected(Side::Left), rejected(Side::Right)],
+        left_residuals_px: residuals.left.clone(),
+        right_residuals_px: residuals.right.clone(),
+    }
 }
 
-fn rig_from_fit(fit: &RigFit, (width_px, height_px): (u32, u32)) -> RigCalibration {
-    let camera = |camera: &CameraIntrinsics| *camera;
+fn rig_from_guess(guess: &Guess, (width_px, height_px): (u32, u32)) -> RigCalibration {
+    // Many small turns leave rounding in a matrix; a quaternion has none of it.
+    let rotation = Rotation3::from_matrix_unchecked(guess.right_from_left);
+    let rotation = nalgebra::UnitQuaternion::from_rotation_matrix(&rotation).to_rotation_matrix();
     RigCalibration {
         width_px,
         height_px,
-        left: camera(&fit.left),
-        right: camera(&fit.right),
-        right_from_left: fit.right_from_left,
-        right_from_left_m: fit.right_from_left_m,
+        left: guess.left,
+        right: guess.right,
+        right_from_left: rotation.into_inner(),
+        right_from_left_m: guess.right_from_left_m,
         body_from_camera: RigCalibration::LOOKING_DOWN,
         camera_in_body_m: Vector3::zeros(),
     }

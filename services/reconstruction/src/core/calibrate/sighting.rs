@@ -1,14 +1,14 @@
 //! One pair of pictures in which both cameras saw the board.
 
-use nalgebra::{Matrix3, Matrix6, Rotation3, UnitQuaternion, Vector2, Vector3, Vector6};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector2, Vector3, Vector6};
 use opencv::core::{Mat, Point2f, Point3f, Vector};
 use opencv::{Result, calib3d};
 
 use halcyon_model::CameraIntrinsics;
 
 use super::board::BoardSpec;
-use super::fit::RigFit;
-use crate::core::{camera, cv};
+use super::bundle::Guess;
+use crate::core::cv;
 
 /// Why a view takes no part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,6 +39,17 @@ impl ViewProblem {
     }
 }
 
+/// Which camera.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Side {
+    Left,
+    Right,
+}
+
+impl Side {
+    pub(super) const BOTH: [Self; 2] = [Self::Left, Self::Right];
+}
+
 /// The board as both cameras saw it once.
 #[derive(Debug, Clone)]
 pub(super) struct Sighting {
@@ -48,84 +59,74 @@ pub(super) struct Sighting {
     pub(super) left: Vec<Point2f>,
     /// The same corners in the right picture.
     pub(super) right: Vec<Point2f>,
-    /// Corners that take part.
-    pub(super) keep: Vec<bool>,
+    /// Left corners that take part.
+    pub(super) keep_left: Vec<bool>,
+    /// Right corners that take part.
+    pub(super) keep_right: Vec<bool>,
     pub(super) problem: Option<ViewProblem>,
 }
 
 impl Sighting {
     pub(super) fn new(view: usize, left: Vec<Point2f>, right: Vec<Point2f>) -> Self {
         let keep = vec![true; left.len()];
-        Self { view, left, right, keep, problem: None }
+        Self { view, left, right, keep_left: keep.clone(), keep_right: keep, problem: None }
     }
 
     pub(super) fn is_used(&self) -> bool {
         self.problem.is_none()
     }
 
-    pub(super) fn kept_corners(&self) -> impl Iterator<Item = usize> {
-        self.keep.iter().enumerate().filter_map(|(i, keep)| keep.then_some(i))
-    }
-
-    /// Reprojection residuals of every corner, kept or not, under the board pose that suits the kept ones best.
-    pub(super) fn residuals(&self, fit: &RigFit, board: &BoardSpec) -> Result<Residuals> {
-        let Some(start) = Pose::of_board(board, &self.left, &fit.left)? else {
-            return Ok(Residuals::unknown(self.left.len()));
-        };
-        let mut pose = start;
-        for _ in 0..10 {
-            let (step, size) = self.pose_step(fit, board, &pose);
-            pose = pose.moved(&step);
-            if size < 1e-10 {
-                break;
-            }
+    pub(super) fn corners(&self, side: Side) -> &[Point2f] {
+        match side {
+            Side::Left => &self.left,
+            Side::Right => &self.right,
         }
-        Ok(self.residuals_at(fit, board, &pose))
     }
 
-    fn residuals_at(&self, fit: &RigFit, board: &BoardSpec, pose: &Pose) -> Residuals {
-        let both = (0..self.left.len()).map(|i| self.residual_of(i, fit, board, pose));
+    pub(super) fn keep(&self, side: Side) -> &[bool] {
+        match side {
+            Side::Left => &self.keep_left,
+            Side::Right => &self.keep_right,
+        }
+    }
+
+    /// Corners that take part in one picture.
+    pub(super) fn kept(&self, side: Side) -> impl Iterator<Item = usize> {
+        self.keep(side).iter().enumerate().filter_map(|(i, keep)| keep.then_some(i))
+    }
+
+    /// Corners that take part in both pictures.
+    pub(super) fn kept_in_both(&self) -> impl Iterator<Item = usize> {
+        self.kept(Side::Left).filter(|&i| self.keep_right[i])
+    }
+
+    /// How many corners take part, left and right counted each.
+    pub(super) fn kept_count(&self) -> usize {
+        Side::BOTH.into_iter().map(|side| self.kept(side).count()).sum()
+    }
+
+    /// Leaves a corner out of one picture.
+    pub(super) fn drop_corner(&mut self, side: Side, corner: usize) {
+        match side {
+            Side::Left => self.keep_left[corner] = false,
+            Side::Right => self.keep_right[corner] = false,
+        }
+    }
+
+    pub(super) fn pixel(&self, side: Side, corner: usize) -> Vector2<f64> {
+        let point = self.corners(side)[corner];
+        Vector2::new(f64::from(point.x), f64::from(point.y))
+    }
+
+    /// Seen minus predicted of every corner, kept or not, with the board at `pose`.
+    pub(super) fn residuals(&self, board: &BoardSpec, guess: &Guess, pose: &Pose) -> Residuals {
+        let both = (0..self.left.len()).map(|i| {
+            let (left, right) = guess.predict(board, pose, i);
+            (self.pixel(Side::Left, i) - left, self.pixel(Side::Right, i) - right)
+        });
         let (left, right) = both.unzip();
         Residuals { left, right }
     }
-
-    /// Seen minus predicted, left and right, pixels.
-    fn residual_of(&self, corner: usize, fit: &RigFit, board: &BoardSpec, pose: &Pose) -> (Vector2<f64>, Vector2<f64>) {
-        let in_left = pose.apply(&board.corner_m(corner));
-        let in_right = fit.right_from_left * in_left + fit.right_from_left_m;
-        (
-            seen(self.left[corner]) - camera::project(&fit.left, &in_left),
-            seen(self.right[corner]) - camera::project(&fit.right, &in_right),
-        )
-    }
-
-    /// One Gauss-Newton step of the board's pose against both pictures, and its length.
-    fn pose_step(&self, fit: &RigFit, board: &BoardSpec, pose: &Pose) -> (Vector6<f64>, f64) {
-        const H: f64 = 1e-6;
-        let moved: [Pose; 6] = std::array::from_fn(|k| pose.moved(&(Vector6::ith(k, H))));
-        let (mut normal, mut gradient) = (Matrix6::zeros(), Vector6::zeros());
-        for corner in self.kept_corners() {
-            let (left, right) = self.residual_of(corner, fit, board, pose);
-            let now = [left.x, left.y, right.x, right.y];
-            let mut slopes = [Vector6::zeros(); 4];
-            for (k, pose) in moved.iter().enumerate() {
-                let (left, right) = self.residual_of(corner, fit, board, pose);
-                for (row, (then, now)) in [left.x, left.y, right.x, right.y].into_iter().zip(now).enumerate() {
-                    slopes[row][k] = (then - now) / H;
-                }
-            }
-            for (slope, residual) in slopes.iter().zip(now) {
-                normal += slope * slope.transpose();
-                gradient += slope * residual;
-            }
-        }
-        let step = normal.cholesky().map_or_else(Vector6::zeros, |factor| -factor.solve(&gradient));
-        (step, step.norm())
-    }
-}
-
-fn seen(point: Point2f) -> Vector2<f64> {
-    Vector2::new(f64::from(point.x), f64::from(point.y))
 }
 
 /// Residuals of one view, pixels, in the order of the board's corners.
@@ -136,9 +137,16 @@ pub(super) struct Residuals {
 }
 
 impl Residuals {
-    fn unknown(corners: usize) -> Self {
+    pub(super) fn unknown(corners: usize) -> Self {
         let nan = vec![Vector2::new(f64::NAN, f64::NAN); corners];
         Self { left: nan.clone(), right: nan }
+    }
+
+    pub(super) fn of(&self, side: Side) -> &[Vector2<f64>] {
+        match side {
+            Side::Left => &self.left,
+            Side::Right => &self.right,
+        }
     }
 }
 
@@ -173,12 +181,13 @@ impl Pose {
         Ok(Some(Self { camera_from_board, camera_from_board_m: cv::vector3_from_mat(&translation)? }))
     }
 
-    fn apply(&self, point_m: &Vector3<f64>) -> Vector3<f64> {
+    #[inline]
+    pub(super) fn apply(&self, point_m: &Vector3<f64>) -> Vector3<f64> {
         self.camera_from_board * point_m + self.camera_from_board_m
     }
 
     /// Turned and shifted a little in the camera's axes: rotation vector first, then metres.
-    fn moved(&self, step: &Vector6<f64>) -> Self {
+    pub(super) fn moved(&self, step: &Vector6<f64>) -> Self {
         let turn = Rotation3::new(step.fixed_rows::<3>(0).into_owned());
         Self {
             camera_from_board: turn.matrix() * self.camera_from_board,
