@@ -11,4 +11,5 @@ pub mod reconstruct;
 pub mod rectify;
 pub mod refine;
 mod resample;
+mod scatter;
 pub mod tilt;
