@@ -92,12 +92,18 @@ pub fn run(extent: Extent, progress: &mut dyn FnMut(usize, usize, &str)) -> Resu
     rows.push(AccuracyRow::new(tank_name, "R² of peak amplitude", "1", errors.r_squared, (0.995, 1.0)).thesis(0.93));
 
     progress(2, total, "from the air");
-    for flight in Flight::all() {
-        let errors = fly(&flight)?;
-        let (h_mean_mm, h_s_mm) = (errors.h_mean_m.abs() * MM, errors.h_s_m.abs() * MM);
-        rows.push(AccuracyRow::new(flight.name, "|error| of H_m", "mm", h_mean_mm, (0.0, 2.0)).thesis(7.5));
-        rows.push(AccuracyRow::new(flight.name, "|error| of H_s", "mm", h_s_mm, (0.0, 3.0)).thesis(11.6));
+    let (mut h_mean_mm, mut h_s_mm, mut flights) = (0.0, 0.0, 0.0);
+    for repetition in 0..if full { 4 } else { 1 } {
+        for flight in Flight::all() {
+            let errors = fly(&Flight { seed: flight.seed + repetition, ..flight.clone() })?;
+            h_mean_mm += errors.h_mean_m.abs() * MM;
+            h_s_mm += errors.h_s_m.abs() * MM;
+            flights += 1.0;
+        }
     }
+    let air = "from the air, 58 s at 2 Hz, eight flights";
+    rows.push(AccuracyRow::new(air, "mean |error| of H_m", "mm", h_mean_mm / flights, (0.0, 2.0)).thesis(7.5));
+    rows.push(AccuracyRow::new(air, "mean |error| of H_s", "mm", h_s_mm / flights, (0.0, 3.0)).thesis(11.6));
 
     progress(3, total, "stated uncertainty");
     let stated = honesty(if full { 60 } else { 12 })?;

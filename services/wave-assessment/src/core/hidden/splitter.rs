@@ -25,7 +25,7 @@ const STANDS_OUT: f64 = 1.64;
 /// Where the autopilot's drift is measured, as shares of the slowest waves' frequency.
 const DRIFT_BAND: (f64, f64) = (0.35, 0.9);
 /// A wave is taken for shorter than dispersion has it when bend over slope says so by more than this: the ratio is noisy.
-const SHORTER: f64 = 0.85;
+const SHORTER: f64 = 0.75;
 /// Waves that the bend leaves unexplained by more than this share are too short for it.
 const UNEXPLAINED_MAX: f64 = 0.5;
 
