@@ -11,5 +11,6 @@ pub mod reconstruct;
 pub mod rectify;
 pub mod refine;
 mod resample;
+mod scatter;
 pub mod study;
 pub mod tilt;

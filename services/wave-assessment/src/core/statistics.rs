@@ -22,6 +22,8 @@ const DENSER: f64 = 4.0;
 const HEIGHT_FREEDOM: f64 = 0.9;
 /// Near the ends of the window a filter cannot know how waves go on: single ones of the hidden part are wrong by about this share.
 const SPLIT_ERROR: f64 = 0.05;
+/// Of what could be waves and is not believed to be, so much may have been believed by mistake.
+const PASSED: f64 = 0.1;
 /// Two-sided 95 % of the normal distribution.
 const NORMAL_95: f64 = 1.96;
 
@@ -53,7 +55,7 @@ impl Statistics {
         };
         let variance_m2 = mean_square(|s| &s.elevation_m);
         // Adding what may be hidden waves can lower the variance by chance; that is no reason to hope.
-        let upper_m2 = mean_square(|s| &s.elevation_upper_m).max(variance_m2);
+        let upper_m2 = mean_square(|s| &s.elevation_upper_m).max(variance_m2) + series.lost_m2;
         let noise_m2 = series.noise_m2;
 
         // Noise about zero makes waves that are none; a dead band against it swallows small waves that are some. Estimates are the
@@ -134,7 +136,7 @@ impl Scale {
         let share = |variance_m2: f64| height_m * (variance_m2.max(0.0) / self.variance_m2).sqrt();
         Estimate {
             value: share(self.variance_m2 - self.noise_m2),
-            low: share(self.variance_m2 * low - self.noise_m2),
+            low: share(self.variance_m2 * low - self.noise_m2 - PASSED * (self.upper_m2 - self.variance_m2)),
             high: share(self.upper_m2 * high),
         }
     }
