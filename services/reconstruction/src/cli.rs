@@ -1,7 +1,17 @@
-//! What `halcyon calibrate` and `halcyon match` do, without the command line: files in, files and a report out.
+//! What `halcyon calibrate`, `halcyon match`, `halcyon reconstruct` and `halcyon rig` do, without the command line: files in,
+//! files and a report out.
 
 mod calibrate;
 mod matching;
+mod reconstruct;
+mod rig;
 
 pub use calibrate::{CalibrateCliError, CalibrateReport, CameraReport, ViewReport, calibrate};
 pub use matching::{MatchCliError, MatchReport, match_pair};
+pub use reconstruct::{
+    FailedPair, MeshOf, PatchReport, PlaneReport, ReconstructCliError, ReconstructOptions, ReconstructReport, SurveyFrame,
+    SurveyReport, cloud_of, given_pose, reconstruct_pair, reconstruct_survey,
+};
+pub use rig::{BestRow, BudgetRow, RigCliError, RigNumbers, RigOptions, RigReport, RigSource, rig};
+
+pub use crate::core::rig_budget::DISPARITY_SIGMA_PX;

@@ -97,7 +97,7 @@ pub fn match_pair(
 
 /// Processor time of this process so far, all threads, seconds, from Linux's `/proc` (in hundredths: `USER_HZ` is 100 on every
 /// architecture that Linux and we run on).
-fn cpu_s() -> Option<f64> {
+pub(super) fn cpu_s() -> Option<f64> {
     let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
     // The name of the program, in brackets, may contain anything; numbers follow the last bracket.
     let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();

@@ -2,13 +2,16 @@
 
 pub mod calibrate;
 pub mod camera;
+pub mod cloud;
 mod cv;
 pub mod disparity;
 pub mod grid;
 pub mod matcher;
+pub mod mesh;
 pub mod plane;
 pub mod reconstruct;
 pub mod rectify;
 pub mod refine;
 mod resample;
+pub mod rig_budget;
 pub mod tilt;
