@@ -51,6 +51,7 @@ fn patch(rig: &str) -> SurfacePatch {
         points: 3,
         level_m: None,
         level_sigma_m: None,
+        level_thesis_m: None,
         processing_s: 0.01,
     }
 }

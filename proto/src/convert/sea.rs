@@ -115,7 +115,9 @@ impl Wire for SeaState {
             verdict: required("verdict", proto.verdict, verdict_from)?,
         };
         // Somebody may land on this word: it needs its evidence.
-        let unfounded = sea_state.h_s_m.is_none() || sea_state.patches == 0 || sea_state.verdict.reasons.iter().any(|reason| !reason.passed);
+        let unfounded = sea_state.h_s_m.is_none()
+            || sea_state.patches == 0
+            || sea_state.verdict.reasons.iter().any(|reason| !reason.passed);
         if sea_state.verdict.state == VerdictState::Safe && unfounded {
             return Err(FieldError::new("verdict.state", "is safe without a measurement, or against a failed check"));
         }

@@ -199,6 +199,7 @@ impl Wire for SurfacePatch {
             points: self.points,
             level_m: self.level_m,
             level_sigma_m: self.level_sigma_m,
+            level_thesis_m: self.level_thesis_m,
             processing_s: self.processing_s,
         }
     }
@@ -214,6 +215,7 @@ impl Wire for SurfacePatch {
             points: proto.points,
             level_m: optionally("level_m", proto.level_m, finite)?,
             level_sigma_m: optionally("level_sigma_m", proto.level_sigma_m, non_negative)?,
+            level_thesis_m: optionally("level_thesis_m", proto.level_thesis_m, finite)?,
             processing_s: non_negative("processing_s", proto.processing_s)?,
         })
     }

@@ -212,6 +212,8 @@ pub struct SurfacePatch {
     pub level_m: Option<f64>,
     /// One standard deviation of `level_m`, metres.
     pub level_sigma_m: Option<f64>,
+    /// The same level as the thesis corrects it, S_z − D cos(pitch) cos(roll) (7-1): for comparison; nothing is decided by it.
+    pub level_thesis_m: Option<f64>,
     /// What reconstruction spent on it, processor seconds of wall time.
     pub processing_s: f64,
 }

@@ -31,6 +31,9 @@ pub struct Config {
     pub cell_m: f64,
     /// Fewer points make no patch.
     pub points_min: u32,
+    /// Whether the rig stands still, on a tripod or over a wave tank: pairs without a pose are then levelled against all water
+    /// seen so far, and distance is level. Never for a rig that is carried.
+    pub fixed_rig: bool,
     /// For the random choices of the robust plane fit; the same seed and pictures give the same patch.
     pub seed: u64,
     /// Pictures for people are published at most this often, hertz, at most 2; 0 turns them off.
@@ -53,6 +56,7 @@ impl Default for Config {
             point_stride_px: settings.point_stride_px,
             cell_m: settings.cell_m,
             points_min: 500,
+            fixed_rig: settings.fixed_rig,
             seed: settings.seed,
             preview_rate_hz: 1.0,
             threads: 1,
@@ -78,6 +82,7 @@ impl Config {
             cell_m: self.cell_m,
             points_min: self.points_min as usize,
             seed: self.seed,
+            fixed_rig: self.fixed_rig,
         })
     }
 

@@ -51,6 +51,15 @@ impl Texture {
     /// Water with ripples, foam and flecks.
     #[must_use]
     pub fn water(seed: u64) -> Self {
+        Self::grained(seed, GRAIN_M)
+    }
+
+    /// The same pattern with its finest grain `grain_m` wide (at least a tenth of a millimetre): a film in a tank, or capillary
+    /// ripples, for cameras that are close. It repeats after 256 grains.
+    #[must_use]
+    pub fn grained(seed: u64, grain_m: f64) -> Self {
+        // `max` also turns NaN into the least.
+        let texel_m = grain_m.max(1e-4) / 4.0;
         let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x7465_7874_7572_6531);
         let mut albedo = vec![WATER_ALBEDO; SIDE * SIDE];
         let mut foam = vec![0.0; SIDE * SIDE];
@@ -70,13 +79,14 @@ impl Texture {
             let t = ((foam - 1.3) / 1.6).clamp(0.0, 1.0);
             *albedo = (*albedo + 0.034 * t * t * (3.0 - 2.0 * t)).max(0.004);
         }
+        // As many as on open water, however fine the grain.
         let area_m2 = (SIDE as f64 * TEXEL_M).powi(2);
         for _ in 0..(area_m2 * FLECKS_PER_M2) as usize {
             let radius = rng.random_range(2.2..3.4_f32);
             let peak = rng.random_range(0.02..0.07_f32);
             fleck(&mut albedo, rng.random_range(0.0..SIDE as f32), rng.random_range(0.0..SIDE as f32), radius, peak);
         }
-        Self::from_texels(albedo, SIDE, TEXEL_M)
+        Self::from_texels(albedo, SIDE, texel_m)
     }
 
     /// A texture of your own: `albedo(north_m, east_m)` on `side × side` texels of `texel_m`, repeated for ever. `side` is rounded

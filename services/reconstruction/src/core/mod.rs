@@ -14,4 +14,5 @@ pub mod rectify;
 pub mod refine;
 mod resample;
 pub mod rig_budget;
+mod scatter;
 pub mod tilt;

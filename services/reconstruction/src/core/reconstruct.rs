@@ -1,9 +1,11 @@
 //! The chain: a stereo pair in, a patch of water surface out.
 
+mod level;
 mod range;
 mod world;
 
 use halcyon_model::{Plane, Preview, StereoPair, SurfacePatch};
+use level::{FixedMount, level_by_thesis_m};
 use nalgebra::{Vector2, Vector3};
 use opencv::core::Vector;
 use opencv::imgcodecs;
@@ -17,6 +19,7 @@ use super::matcher::{DisparityRange, Engine, MatchError, Matcher};
 use super::plane::{self, Match, PlaneError};
 use super::rectify::{RectifiedRig, Rectifier, RectifyError};
 use super::refine::Refiner;
+use super::scatter::Scatter;
 use super::tilt::TiltFilter;
 
 /// What the chain can be told.
@@ -40,6 +43,9 @@ pub struct Settings {
     pub points_min: usize,
     /// For the random choices of the robust plane fit.
     pub seed: u64,
+    /// Whether the rig stands still (a tripod, a wave tank) and its pairs carry no pose. Then water is level against the mean of
+    /// all planes seen, and its level is known by the distance. A carried rig whose carrier is silent is not a fixed one.
+    pub fixed_rig: bool,
 }
 
 impl Default for Settings {
@@ -54,6 +60,7 @@ impl Default for Settings {
             cell_m: 0.15,
             points_min: 500,
             seed: 1,
+            fixed_rig: false,
         }
     }
 }
@@ -105,13 +112,17 @@ pub struct Reconstructor {
     matcher: Box<dyn Matcher>,
     refiner: Option<Refiner>,
     gridder: Gridder,
+    scatter: Scatter,
     tilt: TiltFilter,
+    mount: FixedMount,
     /// Level of the last patch above the datum, metres: where the autopilot's height has wandered to.
     level_m: f64,
     disparity: Disparity,
     sigma_px: Vec<f32>,
     matches: Vec<Match>,
     points: Vec<SurfacePoint>,
+    /// Mean depth of the last pair's points in the rectified left camera, metres.
+    mean_depth_m: f64,
     last_pair: Option<(halcyon_model::Stamp, halcyon_model::RigId)>,
 }
 
@@ -126,12 +137,15 @@ impl Reconstructor {
             settings,
             rectifier: None,
             gridder: Gridder::default(),
+            scatter: Scatter::default(),
             tilt: TiltFilter::default(),
+            mount: FixedMount::default(),
             level_m: 0.0,
             disparity: Disparity::default(),
             sigma_px: Vec::new(),
             matches: Vec::new(),
             points: Vec::new(),
+            mean_depth_m: f64::NAN,
             last_pair: None,
         }
     }
@@ -146,21 +160,27 @@ impl Reconstructor {
         let plane = self.match_surface(pair, &rig)?;
         let world = match &pair.pose {
             Some(pose) => WorldFromRectified::from_pose(pose, &pair.calibration, &rig),
+            None if self.settings.fixed_rig => WorldFromRectified::from_plane(&self.mount.observe(&plane, &pair.calibration)),
             None => WorldFromRectified::from_plane(&plane),
         };
         let sampling = self.place_points(&plane, &rig, &world);
         let sigma_m = self.level_surface(pair, &plane, &world);
         let mut grid = self.gridder.grid(&self.points, self.settings.cell_m, sampling)?;
+        self.scatter.apply(&mut grid, sampling.window_m);
         let level_m = remove_mean(&mut grid);
         let coverage = self.cover(&grid, &plane, &world, &rig);
         self.spread_tilt(&mut grid, sigma_m);
-        let level = pair.pose.as_ref().map(|pose| {
-            let centre = self.centre();
-            let lever_m = (centre - Vector2::new(pose.position_ned_m.x, pose.position_ned_m.y)).norm();
-            let sigma_m = pose.height_sigma_m.hypot(lever_m * pose.attitude_sigma_rad);
-            (level_m, sigma_m)
-        });
-        self.level_m = level.map_or(0.0, |(level_m, _)| level_m);
+        let level = match &pair.pose {
+            Some(pose) => {
+                let centre = self.centre();
+                let lever_m = (centre - Vector2::new(pose.position_ned_m.x, pose.position_ned_m.y)).norm();
+                Some((level_m, pose.height_sigma_m.hypot(lever_m * pose.attitude_sigma_rad)))
+            }
+            None if self.settings.fixed_rig => Some((level_m, level::mean_sigma_m(&grid, sampling.window_m))),
+            None => None,
+        };
+        // The level that a search may start from is the autopilot's wander; a fixed rig searches by its own pairs.
+        self.level_m = if pair.pose.is_some() { level_m } else { 0.0 };
         self.last_pair = Some((pair.stamp, pair.rig.clone()));
         Ok(SurfacePatch {
             stamp: pair.stamp,
@@ -172,6 +192,7 @@ impl Reconstructor {
             points: self.points.len() as u32,
             level_m: level.map(|(level_m, _)| level_m),
             level_sigma_m: level.map(|(_, sigma_m)| sigma_m),
+            level_thesis_m: pair.pose.as_ref().map(|pose| level_by_thesis_m(pose, self.mean_depth_m)),
             processing_s: 0.0,
         })
     }
@@ -312,7 +333,8 @@ impl Reconstructor {
                 sigma_m: sigma_m as f32,
             });
         }
-        let pixel_m = depths_m / self.matches.len().max(1) as f64 / rig.focal_px;
+        self.mean_depth_m = depths_m / self.matches.len().max(1) as f64;
+        let pixel_m = self.mean_depth_m / rig.focal_px;
         let window_px = self.window_px();
         Sampling {
             spacing_m: pixel_m * f64::from(self.settings.point_stride_px.max(1)),

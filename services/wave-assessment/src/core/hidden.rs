@@ -43,11 +43,12 @@ pub(crate) fn hidden(window: &Window, config: &Config, interval_s: f64) -> Hidde
     let share = |n: usize| n as f64 / count as f64;
     let with_level = frames.iter().filter(|f| f.level_m.is_some()).count();
     // A rig that stands still knows its level by its distance to the water, without an autopilot between.
-    let by_pose = count > 0 && share(with_level) >= LEVELS_MIN;
-    if !by_pose && !config.fixed_rig {
+    let with_levels = count > 0 && share(with_level) >= LEVELS_MIN;
+    if !with_levels && !config.fixed_rig {
         return Hidden::Unknown;
     }
-    let level = |f: &Frame| if by_pose { f.level_m } else { Some(-f.distance_m) };
+    let by_pose = with_levels && !config.fixed_rig;
+    let level = |f: &Frame| if with_levels { f.level_m } else { Some(-f.distance_m) };
     let footprint_m = frames.iter().map(|f| f.footprint_m).sum::<f64>() / count as f64;
     // Waves half as long as the footprint average out over it; deep water has the fastest, so none is missed in shallow.
     let high_hz = angular_frequency_radps(TAU / (0.5 * footprint_m), Depth::DEEP) / TAU;

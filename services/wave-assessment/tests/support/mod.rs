@@ -183,6 +183,7 @@ impl Camera {
             points: 20_000,
             level_m,
             level_sigma_m: self.level_sigma_m,
+            level_thesis_m: None,
             processing_s: 0.05,
         }
     }
