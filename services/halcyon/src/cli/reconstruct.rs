@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use halcyon_capture::SurveyFolder;
-use halcyon_chassis::Clock;
+use halcyon_chassis::clock::{Clock, ClockConfig};
 use halcyon_model::PoseAtExposure;
 use halcyon_reconstruction::cli::{self, MeshOf, PatchReport, PlaneReport, ReconstructOptions, SurveyFrame};
 
@@ -138,7 +138,7 @@ fn options(args: &Args) -> ReconstructOptions {
         disparity: outputs.disparity.clone(),
         grid: outputs.grid.clone(),
         wass: outputs.wass.clone(),
-        now: Clock::new(&halcyon_chassis::ClockConfig::default()).now(),
+        now: Clock::new(&ClockConfig::default()).now(),
         command: format!("halcyon {}", words.collect::<Vec<_>>().join(" ")),
     }
 }

@@ -16,7 +16,8 @@ use crate::report::{Chart, ChartError, Page, Series};
 Example: halcyon rig --fov-deg 64 --width 640 --height 480 --baseline-m 0.092 --altitudes 0.5..5
 
 For a rig that looks straight down. Elevation noise of a point is altitude² / (f b) times the disparity's; waves without a
-given length are those of a fully developed sea, 39 times as long as high.")]
+given length are those of a fully developed sea, 39 times as long as high. What a wave loses in the footprint's own mean plane
+is the worst case: height and attitude give some of it back.")]
 pub(super) struct Args {
     /// The rig's calibration, OpenCV YAML
     #[arg(long, value_name = "FILE", conflicts_with_all = ["fov_deg", "width", "height", "baseline_m"])]
@@ -192,6 +193,7 @@ fn noise(report: &RigReport) -> Chart {
         .with(Series::line("lowest sea within 10 %", series(|row| row.wave_height_m_min)))
         .with(Series::line("highest sea within 10 %", series(|row| row.wave_height_m_max)))
         .log_y()
+        .low_legend()
 }
 
 /// Footprint and wave lengths, against altitude.
@@ -205,6 +207,7 @@ fn lengths(report: &RigReport) -> Chart {
         .with(Series::line("shortest wave that is resolved", series(|row| row.wavelength_m_min)))
         .with(Series::line("a pixel on the water", series(|row| row.pixel_m)))
         .log_y()
+        .low_legend()
 }
 
 fn disparities(report: &RigReport) -> Chart {

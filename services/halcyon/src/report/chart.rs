@@ -46,6 +46,7 @@ pub struct Chart {
     from_zero: bool,
     log_y: bool,
     equal_scales: bool,
+    low_legend: bool,
 }
 
 impl Chart {
@@ -58,6 +59,7 @@ impl Chart {
             from_zero: false,
             log_y: false,
             equal_scales: false,
+            low_legend: false,
         }
     }
 
@@ -79,6 +81,13 @@ impl Chart {
     #[must_use]
     pub fn log_y(mut self) -> Self {
         self.log_y = true;
+        self
+    }
+
+    /// Names the series in the lower right corner: for curves that rise.
+    #[must_use]
+    pub fn low_legend(mut self) -> Self {
+        self.low_legend = true;
         self
     }
 
@@ -158,7 +167,7 @@ impl Chart {
         if self.series.iter().any(|series| !series.name.is_empty()) {
             chart
                 .configure_series_labels()
-                .position(SeriesLabelPosition::UpperRight)
+                .position(if self.low_legend { SeriesLabelPosition::LowerRight } else { SeriesLabelPosition::UpperRight })
                 .background_style(WHITE.mix(0.85))
                 .border_style(BLACK.mix(0.2))
                 .label_font(("sans-serif", 13))

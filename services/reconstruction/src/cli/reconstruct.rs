@@ -87,8 +87,9 @@ pub fn reconstruct_pair(
     let calibration = read_rig(rig)?;
     let settings = options.settings(&calibration, 1)?;
     let pair = stereo_pair(calibration, read_picture(left)?, read_picture(right)?, pose, Stamp::default(), 0)?;
+    let frame = frame_of(&pair);
     let mut series = match options.series_file() {
-        Some(path) => Some(Series::beside(path)?),
+        Some(path) => Some(Series::beside(path, frame)?),
         None => None,
     };
     let mut chain = Chain::new(settings, options.cell_m.is_none());
@@ -98,7 +99,6 @@ pub fn reconstruct_pair(
         series.push(&patch)?;
         options.write_series(series, &calibration)?;
     }
-    let frame = frame_of(&pair);
     Ok(ReconstructReport::new(chain.engine, frame, &patch, chain.reconstructor.disparity(), timing))
 }
 

@@ -19,6 +19,7 @@ use halcyon_model::{RigCalibration, SurfacePatch};
 use spool::Spool;
 
 use super::{FileError, write_whole};
+use crate::core::cloud::CloudFrame;
 
 /// More cells than any survey's common grid needs: 400 × 400 m in cells of 20 cm.
 const CELLS_MAX: i64 = 1 << 22;
@@ -73,12 +74,12 @@ pub struct Series {
 }
 
 impl Series {
-    /// An empty series; its cells wait in the folder of `out` (which thereby proves writable).
+    /// An empty series of patches in this frame; their cells wait in the folder of `out` (which thereby proves writable).
     ///
     /// # Errors
     /// [`FileError::Write`], naming `out`.
-    pub fn beside(out: &Path) -> Result<Self, FileError> {
-        Ok(Self { spool: Spool::beside(out)? })
+    pub fn beside(out: &Path, frame: CloudFrame) -> Result<Self, FileError> {
+        Ok(Self { spool: Spool::beside(out, frame)? })
     }
 
     /// Patches so far.
@@ -96,7 +97,7 @@ impl Series {
     /// Adds a patch.
     ///
     /// # Errors
-    /// [`SeriesError`] where it has another cell or frame than those before it, lies too far from them, or the disk is full.
+    /// [`SeriesError`] where it has another cell than those before it, lies too far from them, or the disk is full.
     pub fn push(&mut self, patch: &SurfacePatch) -> Result<(), SeriesError> {
         self.spool.push(patch)
     }
@@ -111,7 +112,8 @@ impl Series {
     }
 
     /// Writes all patches in the layout of WASS's `wassgridsurface`: `Z(count, X, Y)`, `X_grid` and `Y_grid` in millimetres,
-    /// `time`, `scale` (the baseline, metres). As there, rows of `Y_grid` come first, whatever the dimensions are called. The
+    /// `time`, `scale` (the baseline, metres). `Z` is above the mean plane of all patches where the rig is fixed, and above each
+    /// patch's own mean where it is carried: the autopilot's wander is no wave. As there, rows of `Y_grid` come first, whatever the dimensions are called. The
     /// camera's pictures, which `wassncplot` draws on, are not in it.
     ///
     /// # Errors

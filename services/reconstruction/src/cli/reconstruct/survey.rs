@@ -6,6 +6,8 @@ use halcyon_model::{PoseAtExposure, RigCalibration, Stamp, SurfacePatch};
 use serde::Serialize;
 
 use super::{Chain, PatchReport, PlaneReport, ReconstructCliError, ReconstructOptions, Timing, read_picture, stereo_pair};
+use crate::core::cloud::CloudFrame;
+use crate::core::reconstruct::Settings;
 use crate::files::netcdf::Series;
 
 /// One pair of a survey.
@@ -76,9 +78,12 @@ pub fn reconstruct_survey(
             return Err(ReconstructCliError::OnePair(flag));
         }
     }
-    let settings = options.settings(calibration, 2)?;
+    // "Without attitude the rig is taken as fixed."
+    let fixed_rig = frames.iter().all(|frame| frame.pose.is_none());
+    let frame = if fixed_rig { CloudFrame::Plane } else { CloudFrame::Gravity };
+    let settings = Settings { fixed_rig, ..options.settings(calibration, 2)? };
     let mut series = match options.series_file() {
-        Some(path) => Some(Series::beside(path)?),
+        Some(path) => Some(Series::beside(path, frame)?),
         None => None,
     };
     let mut chain = Chain::new(settings, options.cell_m.is_none());
@@ -103,8 +108,7 @@ pub fn reconstruct_survey(
         progress(index + 1, frames.len(), failure.as_ref());
         failed.extend(failure);
     }
-    let frame = if frames.iter().any(|frame| frame.pose.is_some()) { "gravity" } else { "plane" };
-    match (sums.report(chain.engine, frame, frames.len(), failed), first_error) {
+    match (sums.report(chain.engine, frame.name(), frames.len(), failed), first_error) {
         (Some(report), _) => {
             if let Some(series) = &mut series {
                 options.write_series(series, calibration)?;

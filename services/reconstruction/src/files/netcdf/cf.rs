@@ -5,6 +5,7 @@ use halcyon_model::rig_yaml;
 
 use super::spool::{Cells, Entry, Spool};
 use super::{About, FillError, describe};
+use crate::core::cloud::CloudFrame;
 
 /// A chunk holds about so many values: a series at one place and a map at one time are both read quickly.
 const CHUNK_VALUES: usize = 1 << 18;
@@ -14,15 +15,17 @@ const HEIGHT: &str = "water_surface_height_above_reference_datum";
 const HEIGHT_ERROR: &str = "water_surface_height_above_reference_datum standard_error";
 
 pub(super) fn fill(file: &mut FileMut, spool: &mut Spool, about: &About) -> Result<(), FillError> {
-    let (cell_m, is_local, extent) = spool.grid();
+    let (cell_m, extent) = spool.grid();
+    let is_local = spool.frame == CloudFrame::Gravity;
+    let has_level = spool.entries.iter().any(|entry| entry.level_m.is_some());
     let Some(first) = spool.entries.first().copied() else { return Ok(()) };
-    about_file(file, about, cell_m, is_local)?;
+    about_file(file, about, cell_m, spool.frame, has_level)?;
     file.add_unlimited_dimension("time")?;
     file.add_dimension("north", extent.rows)?;
     file.add_dimension("east", extent.cols)?;
     file.add_dimension("axis", 3)?;
     axes(file, spool, is_local)?;
-    for scalar in scalars(is_local) {
+    for scalar in scalars(has_level, is_local) {
         let mut variable = file.add_variable::<f64>(scalar.name, &["time"])?;
         variable.set_fill_value(f64::NAN)?;
         describe(&mut variable, scalar.attributes)?;
@@ -35,8 +38,19 @@ pub(super) fn fill(file: &mut FileMut, spool: &mut Spool, about: &About) -> Resu
     maps(file, spool)
 }
 
-fn about_file(file: &mut FileMut, about: &About, cell_m: f64, is_local: bool) -> Result<(), Error> {
+fn about_file(file: &mut FileMut, about: &About, cell_m: f64, frame: CloudFrame, has_level: bool) -> Result<(), Error> {
     let rig = &about.calibration;
+    let comment = match (frame, has_level) {
+        (CloudFrame::Gravity, _) => {
+            "Elevation is above each patch's own mean level, which is the variable level: the autopilot's wander stays there"
+        }
+        (CloudFrame::Plane, true) => {
+            "The rig stood still: level by the mean of all its planes; the mean level of each patch is the variable level"
+        }
+        (CloudFrame::Plane, false) => {
+            "No attitude was known: each patch is level by its own mean plane, and north is the top of the left picture"
+        }
+    };
     for (name, value) in [
         ("Conventions", "CF-1.8"),
         ("title", "Water surface elevation by stereo vision"),
@@ -44,15 +58,8 @@ fn about_file(file: &mut FileMut, about: &About, cell_m: f64, is_local: bool) ->
         ("source", &about.source),
         ("history", &about.history),
         ("references", "Sam-Odusina (thesis), chapters 4, 5 and 7"),
-        (
-            "comment",
-            if is_local {
-                "Elevation is above each patch's own mean level, which is the variable level: the autopilot's wander stays there"
-            } else {
-                "No attitude was known: each patch is level by its own mean plane, and north is the top of the left picture"
-            },
-        ),
-        ("frame", if is_local { "gravity" } else { "plane" }),
+        ("comment", comment),
+        ("frame", frame.name()),
         ("rig_calibration", &rig_yaml::write(rig)),
     ] {
         file.add_attribute(name, value)?;
@@ -70,9 +77,10 @@ fn axes(file: &mut FileMut, spool: &Spool, is_local: bool) -> Result<(), Error> 
     } else {
         ["distance towards the top of the left picture", "distance towards the right of the left picture"]
     };
-    for (name, axis, long_name, values) in [("north", "Y", names[0], &north_m), ("east", "X", names[1], &east_m)] {
+    // Without `axis`: CF then asks for longitudes and latitudes, and a rig does not know where on Earth its origin is.
+    for (name, long_name, values) in [("north", names[0], &north_m), ("east", names[1], &east_m)] {
         let mut variable = file.add_variable::<f64>(name, &[name])?;
-        describe(&mut variable, &[("long_name", long_name), ("units", "m"), ("axis", axis)])?;
+        describe(&mut variable, &[("long_name", long_name), ("units", "m")])?;
         variable.put_values(values, ..)?;
     }
     Ok(())
@@ -85,7 +93,7 @@ struct Scalar {
     value: fn(&Entry) -> f64,
 }
 
-fn scalars(is_local: bool) -> impl Iterator<Item = Scalar> {
+fn scalars(has_level: bool, is_local: bool) -> impl Iterator<Item = Scalar> {
     let always = [
         Scalar {
             name: "coverage",
@@ -111,7 +119,7 @@ fn scalars(is_local: bool) -> impl Iterator<Item = Scalar> {
             name: "level",
             attributes: &[
                 ("standard_name", HEIGHT),
-                ("long_name", "mean water level under the patch above the local datum, by the autopilot's height"),
+                ("long_name", "mean water level of the patch above the datum"),
                 ("units", "m"),
                 ("ancillary_variables", "level_sigma"),
             ],
@@ -127,7 +135,19 @@ fn scalars(is_local: bool) -> impl Iterator<Item = Scalar> {
             value: |entry| entry.level_sigma_m.unwrap_or(f64::NAN),
         },
     ];
-    always.into_iter().chain(level.into_iter().filter(move |_| is_local))
+    let thesis = Scalar {
+        name: "level_thesis",
+        attributes: &[
+            (
+                "long_name",
+                "mean level by the thesis's correction, height - distance cos(pitch) cos(roll) (7-1), for comparison",
+            ),
+            ("units", "m"),
+        ],
+        value: |entry| entry.level_thesis_m.unwrap_or(f64::NAN),
+    };
+    let level = level.into_iter().filter(move |_| has_level);
+    always.into_iter().chain(level).chain(std::iter::once(thesis).filter(move |_| is_local))
 }
 
 fn normals_and_points(file: &mut FileMut, spool: &Spool) -> Result<(), Error> {
@@ -164,7 +184,7 @@ fn times(file: &mut FileMut, spool: &Spool, since_s: i64) -> Result<(), Error> {
 }
 
 fn maps(file: &mut FileMut, spool: &mut Spool) -> Result<(), FillError> {
-    let (_, _, extent) = spool.grid();
+    let (_, extent) = spool.grid();
     let (rows, cols) = (extent.rows, extent.cols);
     let chunk = [(CHUNK_VALUES / (rows * cols)).clamp(1, spool.entries.len()), rows, cols];
     for (name, attributes) in [

@@ -7,6 +7,7 @@ use std::path::Path;
 use halcyon_model::{Plane, Stamp, SurfacePatch};
 
 use super::{CELLS_MAX, FileError, SeriesError};
+use crate::core::cloud::CloudFrame;
 
 /// What is kept of a patch in memory.
 #[derive(Debug, Clone, Copy)]
@@ -17,6 +18,7 @@ pub(super) struct Entry {
     pub(super) points: u32,
     pub(super) level_m: Option<f64>,
     pub(super) level_sigma_m: Option<f64>,
+    pub(super) level_thesis_m: Option<f64>,
     /// The patch's south-western cell on the lattice.
     first: [i64; 2],
     rows: usize,
@@ -51,6 +53,7 @@ impl Extent {
 /// The waiting patches.
 pub(super) struct Spool {
     pub(super) entries: Vec<Entry>,
+    pub(super) frame: CloudFrame,
     cells: BufWriter<File>,
     end: u64,
     shape: Option<Shape>,
@@ -61,12 +64,11 @@ pub(super) struct Spool {
 #[derive(Debug, Clone, Copy)]
 struct Shape {
     cell_m: f64,
-    has_level: bool,
     extent: Extent,
 }
 
 impl Spool {
-    pub(super) fn beside(out: &Path) -> Result<Self, FileError> {
+    pub(super) fn beside(out: &Path, frame: CloudFrame) -> Result<Self, FileError> {
         let folder = match out.parent() {
             Some(folder) if !folder.as_os_str().is_empty() => folder,
             _ => Path::new("."),
@@ -75,13 +77,12 @@ impl Spool {
             // The library adds the folder's path to its text; ours names the file.
             FileError::Write { path: out.into(), source: source.kind().into() }
         })?;
-        Ok(Self { entries: Vec::new(), cells: BufWriter::new(cells), end: 0, shape: None, out: out.into() })
+        Ok(Self { entries: Vec::new(), frame, cells: BufWriter::new(cells), end: 0, shape: None, out: out.into() })
     }
 
     pub(super) fn push(&mut self, patch: &SurfacePatch) -> Result<(), SeriesError> {
         let grid = &patch.grid;
         let (rows, cols) = (grid.rows as usize, grid.cols as usize);
-        let has_level = patch.level_m.is_some();
         let (cell_m, count) = (grid.cell_m, rows * cols);
         // Negated so that NaN is refused, too.
         if !(cell_m > 0.0 && count > 0 && grid.elevation_m.len() == count && grid.sigma_m.len() == count) {
@@ -92,9 +93,8 @@ impl Spool {
         let own = Extent { first, rows, cols };
         let shape = match self.shape {
             Some(shape) if (shape.cell_m - cell_m).abs() > 1e-9 * cell_m => return Err(SeriesError::Mixed("has another cell")),
-            Some(shape) if shape.has_level != has_level => return Err(SeriesError::Mixed("has another frame")),
             Some(shape) => Shape { extent: shape.extent.union(own), ..shape },
-            None => Shape { cell_m, has_level, extent: own },
+            None => Shape { cell_m, extent: own },
         };
         let (all_rows, all_cols) = (shape.extent.rows as f64, shape.extent.cols as f64);
         if all_rows * all_cols > CELLS_MAX as f64 {
@@ -107,6 +107,7 @@ impl Spool {
             points: patch.points,
             level_m: patch.level_m,
             level_sigma_m: patch.level_sigma_m,
+            level_thesis_m: patch.level_thesis_m,
             first,
             rows,
             cols,
@@ -122,22 +123,22 @@ impl Spool {
         Ok(())
     }
 
-    /// The common grid: side of a cell, whether its frame is the local one, and its rectangle.
-    pub(super) fn grid(&self) -> (f64, bool, Extent) {
+    /// The common grid: side of a cell and its rectangle.
+    pub(super) fn grid(&self) -> (f64, Extent) {
         let none = Extent { first: [0, 0], rows: 0, cols: 0 };
-        self.shape.map_or((1.0, false, none), |shape| (shape.cell_m, shape.has_level, shape.extent))
+        self.shape.map_or((1.0, none), |shape| (shape.cell_m, shape.extent))
     }
 
     /// Centres of the common grid's rows (northwards) and columns (eastwards), metres.
     pub(super) fn axes(&self) -> (Vec<f64>, Vec<f64>) {
-        let (cell_m, _, extent) = self.grid();
+        let (cell_m, extent) = self.grid();
         let axis = |first: i64, count: usize| (0..count).map(|i| (first as f64 + i as f64 + 0.5) * cell_m).collect();
         (axis(extent.first[0], extent.rows), axis(extent.first[1], extent.cols))
     }
 
     /// Elevations and standard deviations of a patch on the common grid, NaN where it has none; in reused buffers.
     pub(super) fn read(&mut self, entry: &Entry, to: &mut Cells) -> std::io::Result<()> {
-        let (_, _, extent) = self.grid();
+        let (_, extent) = self.grid();
         let count = entry.rows * entry.cols;
         self.cells.seek(SeekFrom::Start(entry.at))?;
         to.bytes.resize(8 * count, 0);

@@ -51,6 +51,7 @@ fn patch(stamp_ns: i64, row: i32, col: i32, rows: u32, cols: u32) -> SurfacePatc
         points: 1234,
         level_m: Some(0.125),
         level_sigma_m: Some(0.02),
+        level_thesis_m: Some(0.25),
         processing_s: 0.0,
     }
 }
@@ -59,7 +60,11 @@ const START_NS: i64 = 1_750_000_000_250_000_000;
 
 /// Three patches that drift, also to the south and west, which no appending could have told beforehand.
 fn drifting(folder: &Path) -> Series {
-    let mut series = Series::beside(&folder.join("out.nc")).unwrap();
+    drifting_in(folder, CloudFrame::Gravity)
+}
+
+fn drifting_in(folder: &Path, frame: CloudFrame) -> Series {
+    let mut series = Series::beside(&folder.join("out.nc"), frame).unwrap();
     for (i, (row, col)) in [(0, 0), (-3, 1), (2, -2)].into_iter().enumerate() {
         series.push(&patch(START_NS + i as i64 * 500_000_001, row, col, 4, 3)).unwrap();
     }
@@ -105,6 +110,7 @@ fn drifting_patches_share_one_grid() {
         (vec![0.125; 3], vec![1234.0; 3], vec![0.0, 0.6, 0.8])
     );
     let variable = file.variable("elevation").unwrap();
+    assert_eq!(values("level_thesis"), [0.25; 3]);
     assert_eq!(text(&variable, "units"), "m");
     assert_eq!(text(&variable, "ancillary_variables"), "elevation_sigma");
     assert!(variable.fill_value::<f32>().unwrap().unwrap().is_nan());
@@ -136,6 +142,12 @@ fn wass_has_its_names_and_millimetres() {
     assert_eq!(values("scale"), [0.4]);
     assert!((values("time")[2] - 1.000_000_002).abs() < 1e-12);
     assert_eq!(values("maskZ").iter().sum::<f64>(), 29.0, "the union of three times eleven cells");
+    // A rig that stands still has a level that is water's, not an autopilot's.
+    let fixed = folder.path().join("fixed.nc");
+    drifting_in(folder.path(), CloudFrame::Plane).write_wass(&fixed, &about()).unwrap();
+    let fixed = ::netcdf::open(&fixed).unwrap().variable("Z").unwrap().get_values::<f64, _>(..).unwrap();
+    let raised = fixed.iter().zip(&z_mm).filter(|(_, z_mm)| z_mm.is_finite());
+    assert!(raised.into_iter().all(|(fixed, z_mm)| (fixed - z_mm - 125.0).abs() < 1e-2));
     let meta = file.group("meta").unwrap().unwrap();
     assert_eq!(meta.variable("intr0").unwrap().get_values::<f64, _>(..).unwrap()[..3], [343.1, 0.0, 159.5]);
 }
@@ -144,8 +156,8 @@ fn wass_has_its_names_and_millimetres() {
 fn what_cannot_be_written_leaves_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("out.nc");
-    assert!(matches!(Series::beside(&path).unwrap().write_cf(&path, &about()), Err(SeriesError::Empty)));
-    assert!(matches!(Series::beside(Path::new("/nowhere/out.nc")), Err(FileError::Write { .. })));
+    assert!(matches!(Series::beside(&path, CloudFrame::Gravity).unwrap().write_cf(&path, &about()), Err(SeriesError::Empty)));
+    assert!(matches!(Series::beside(Path::new("/nowhere/out.nc"), CloudFrame::Plane), Err(FileError::Write { .. })));
     let mut series = drifting(folder.path());
     assert!(matches!(series.push(&patch(0, 4_000_000, 0, 4, 3)), Err(SeriesError::TooLarge { .. })));
     assert!(matches!(series.push(&patch(0, i32::MAX - 9, i32::MIN, 4, 3)), Err(SeriesError::TooLarge { .. })));
@@ -153,9 +165,6 @@ fn what_cannot_be_written_leaves_nothing() {
     other.grid.cell_m = 0.3;
     assert!(matches!(series.push(&other), Err(SeriesError::Mixed(_))));
     other.grid.cell_m = f64::NAN;
-    assert!(matches!(series.push(&other), Err(SeriesError::Mixed(_))));
-    let mut other = patch(0, 0, 0, 4, 3);
-    other.level_m = None;
     assert!(matches!(series.push(&other), Err(SeriesError::Mixed(_))));
     let directory = folder.path().join("directory.nc");
     std::fs::create_dir(&directory).unwrap();

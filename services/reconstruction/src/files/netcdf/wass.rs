@@ -6,11 +6,12 @@ use halcyon_model::CameraIntrinsics;
 
 use super::spool::{Cells, Spool};
 use super::{About, FillError, describe};
+use crate::core::cloud::CloudFrame;
 
 const MM_PER_M: f64 = 1e3;
 
 pub(super) fn fill(file: &mut FileMut, spool: &mut Spool, about: &About) -> Result<(), FillError> {
-    let (_, _, extent) = spool.grid();
+    let (_, extent) = spool.grid();
     let (rows, cols, count) = (extent.rows, extent.cols, spool.entries.len());
     file.add_attribute("source", about.source.as_str())?;
     file.add_attribute("history", about.history.as_str())?;
@@ -53,7 +54,7 @@ fn grids(file: &mut FileMut, spool: &Spool) -> Result<(), Error> {
 
 /// Writes `Z` and `maskZ` (1 where any patch has a value); returns the least and largest `Z`, millimetres.
 fn heights(file: &mut FileMut, spool: &mut Spool) -> Result<(f64, f64), FillError> {
-    let (_, _, extent) = spool.grid();
+    let (_, extent) = spool.grid();
     let (rows, cols) = (extent.rows, extent.cols);
     let mut z = file.add_variable::<f32>("Z", &["count", "X", "Y"])?;
     z.set_fill_value(f32::NAN)?;
@@ -63,13 +64,15 @@ fn heights(file: &mut FileMut, spool: &mut Spool) -> Result<(f64, f64), FillErro
         &mut z,
         &[("units", "millimeter"), ("long_name", "Z data on time over the XY grid"), ("field", "Z, scalar, series")],
     )?;
+    let fixed = spool.frame == CloudFrame::Plane;
     let mut mask = vec![0.0_f32; rows * cols];
     let (mut least, mut largest) = (f64::INFINITY, f64::NEG_INFINITY);
     let (mut cells, entries) = (Cells::default(), spool.entries.clone());
     for (time, entry) in entries.iter().enumerate() {
         spool.read(entry, &mut cells)?;
+        let level_m = if fixed { entry.level_m.unwrap_or(0.0) as f32 } else { 0.0 };
         for (value, seen) in cells.elevation_m.iter_mut().zip(&mut mask) {
-            *value *= MM_PER_M as f32;
+            *value = (*value + level_m) * MM_PER_M as f32;
             if value.is_finite() {
                 *seen = 1.0;
                 (least, largest) = (least.min(f64::from(*value)), largest.max(f64::from(*value)));
