@@ -109,7 +109,7 @@ impl Lattice {
         }
     }
 
-    fn mesh(self, frame: CloudFrame) -> Mesh {
+    fn mesh(&self, frame: CloudFrame) -> Mesh {
         let mut faces = Vec::with_capacity(2 * self.vertices.len());
         let rows = self.index.len() / self.cols.max(1);
         for row in 1..rows {
@@ -119,7 +119,7 @@ impl Lattice {
                 self.square(around.map(|(row, col)| self.index[row * self.cols + col]), &mut faces);
             }
         }
-        finish(self.vertices, faces, frame)
+        finish(&self.vertices, faces, frame)
     }
 
     /// Up to two faces of a square of corners, along its flatter diagonal.
@@ -159,7 +159,7 @@ fn jumps(p: &Vertex, q: &Vertex) -> bool {
 }
 
 /// Leaves out vertices without a face and gives the others their normals.
-fn finish(vertices: Vec<Vertex>, faces: Vec<[u32; 3]>, frame: CloudFrame) -> Mesh {
+fn finish(vertices: &[Vertex], faces: Vec<[u32; 3]>, frame: CloudFrame) -> Mesh {
     let mut mesh = Mesh { frame, vertices: Vec::with_capacity(vertices.len()), faces };
     let mut moved = HashMap::with_capacity(vertices.len());
     for face in &mut mesh.faces {
