@@ -123,7 +123,9 @@ impl Chart {
         let mut builder = ChartBuilder::on(&area);
         builder.margin(12).x_label_area_size(44).y_label_area_size(68);
         let mut chart = builder.build_cartesian_2d(x.0..x.1, y.0..y.1).map_err(ChartError::draw)?;
-        let y_text = |y: &f64| scale::label(if self.log_y { 10_f64.powf(*y) } else { *y });
+        // On a logarithmic axis two digits tell all, and four would run into the axis's name.
+        let two_digits = |value: f64| format!("{value:.1e}").parse().unwrap_or(value);
+        let y_text = |y: &f64| scale::label(if self.log_y { two_digits(10_f64.powf(*y)) } else { *y });
         chart
             .configure_mesh()
             .x_desc(&self.x_label)
