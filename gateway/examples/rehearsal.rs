@@ -52,6 +52,10 @@ fn patch(rig: &str) -> SurfacePatch {
         level_m: None,
         level_sigma_m: None,
         level_thesis_m: None,
+        error_length_m: 0.1,
+        slope_removed: [0.0; 2],
+        slope_sigma: 0.0,
+        attitude_sigma_rad: 0.0,
         processing_s: 0.01,
     }
 }

@@ -200,6 +200,11 @@ impl Wire for SurfacePatch {
             level_m: self.level_m,
             level_sigma_m: self.level_sigma_m,
             level_thesis_m: self.level_thesis_m,
+            error_length_m: self.error_length_m,
+            slope_removed_north: self.slope_removed[0],
+            slope_removed_east: self.slope_removed[1],
+            slope_sigma: self.slope_sigma,
+            attitude_sigma_rad: self.attitude_sigma_rad,
             processing_s: self.processing_s,
         }
     }
@@ -216,6 +221,13 @@ impl Wire for SurfacePatch {
             level_m: optionally("level_m", proto.level_m, finite)?,
             level_sigma_m: optionally("level_sigma_m", proto.level_sigma_m, non_negative)?,
             level_thesis_m: optionally("level_thesis_m", proto.level_thesis_m, finite)?,
+            error_length_m: non_negative("error_length_m", proto.error_length_m)?,
+            slope_removed: [
+                finite("slope_removed_north", proto.slope_removed_north)?,
+                finite("slope_removed_east", proto.slope_removed_east)?,
+            ],
+            slope_sigma: non_negative("slope_sigma", proto.slope_sigma)?,
+            attitude_sigma_rad: non_negative("attitude_sigma_rad", proto.attitude_sigma_rad)?,
             processing_s: non_negative("processing_s", proto.processing_s)?,
         })
     }

@@ -19,6 +19,7 @@
 pub mod command;
 pub mod fleet;
 pub mod geo;
+pub mod grid_error;
 pub mod id;
 pub mod mission;
 pub mod plan;

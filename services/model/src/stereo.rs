@@ -207,13 +207,23 @@ pub struct SurfacePatch {
     pub plane: Plane,
     /// Triangulated points that went in.
     pub points: u32,
-    /// Mean water level under the patch above the fleet's datum by the autopilot's height, metres, positive up; `None` without
-    /// a pose. It carries the autopilot's wander, so that the grid is kept apart from it.
+    /// Mean water level under the patch, metres, positive up: above the fleet's datum by the autopilot's height, whose wander it
+    /// carries, so that the grid is kept apart from it; above the first patch's level where the rig stands still. `None` for a
+    /// carried rig without a pose.
     pub level_m: Option<f64>,
     /// One standard deviation of `level_m`, metres.
     pub level_sigma_m: Option<f64>,
     /// The same level as the thesis corrects it, S_z − D cos(pitch) cos(roll) (7-1): for comparison; nothing is decided by it.
     pub level_thesis_m: Option<f64>,
+    /// Errors of cells closer than this are partly the same, metres: the matching window on the water (see [`crate::grid_error`]).
+    pub error_length_m: f64,
+    /// Slope (rise over run, north and east) that was taken out of the grid as the attitude's error; 0 where none was.
+    pub slope_removed: [f64; 2],
+    /// One standard deviation of the slope that is still wrong after that, each axis. Each cell's standard deviation holds what it does
+    /// there: this times the distance from the middle of the patch.
+    pub slope_sigma: f64,
+    /// One standard deviation of roll and pitch that the pose stated, radians; 0 without a pose.
+    pub attitude_sigma_rad: f64,
     /// What reconstruction spent on it, processor seconds of wall time.
     pub processing_s: f64,
 }

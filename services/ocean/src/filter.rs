@@ -1,6 +1,7 @@
 //! Splitting a record by frequency.
 
 use realfft::RealFftPlanner;
+pub use realfft::num_complex::Complex;
 
 use crate::record::{Record, remove_line};
 
@@ -12,28 +13,78 @@ use crate::record::{Record, remove_line};
 /// infinity all that is fast.
 #[must_use]
 pub fn band_pass(record: &Record, low_hz: f64, high_hz: f64) -> Vec<f64> {
-    let n = record.samples_m().len();
-    let mut middle = record.samples_m().to_vec();
-    remove_line(&mut middle);
-    let mut extended: Vec<f64> = middle.iter().chain(middle.iter().rev()).copied().collect();
-    let length = extended.len();
-    let mut planner = RealFftPlanner::<f64>::new();
-    let (forward, inverse) = (planner.plan_fft_forward(length), planner.plan_fft_inverse(length));
-    let mut bins = forward.make_output_vec();
-    if forward.process(&mut extended, &mut bins).is_err() {
-        return middle;
+    let mirrored = Mirrored::of(record);
+    let weighed = |(i, bin): (usize, &Complex<f64>)| bin * band(mirrored.frequency_hz(i), low_hz, high_hz);
+    mirrored.rebuilt(mirrored.bins().iter().enumerate().map(weighed).collect())
+}
+
+/// The weight of a frequency in [`band_pass`].
+#[must_use]
+pub fn band(f_hz: f64, low_hz: f64, high_hz: f64) -> f64 {
+    above(f_hz, low_hz) * (1.0 - above(f_hz, high_hz))
+}
+
+/// Fourier components of a record that its trend has been taken off and that its mirror image continues: what [`band_pass`] works on.
+#[derive(Debug, Clone)]
+pub struct Mirrored {
+    middle: Vec<f64>,
+    bins: Vec<Complex<f64>>,
+    df_hz: f64,
+}
+
+impl Mirrored {
+    /// Of a record.
+    #[must_use]
+    pub fn of(record: &Record) -> Self {
+        let mut middle = record.samples_m().to_vec();
+        remove_line(&mut middle);
+        let mut extended: Vec<f64> = middle.iter().chain(middle.iter().rev()).copied().collect();
+        let df_hz = record.rate_hz() / extended.len() as f64;
+        let forward = RealFftPlanner::<f64>::new().plan_fft_forward(extended.len());
+        let mut bins = forward.make_output_vec();
+        if forward.process(&mut extended, &mut bins).is_err() {
+            bins.clear();
+        }
+        Self { middle, bins, df_hz }
     }
-    let df_hz = record.rate_hz() / length as f64;
-    for (i, bin) in bins.iter_mut().enumerate() {
-        let f_hz = i as f64 * df_hz;
-        *bin *= above(f_hz, low_hz) * (1.0 - above(f_hz, high_hz)) / length as f64;
+
+    /// Components from 0 to half the rate.
+    #[must_use]
+    pub fn bins(&self) -> &[Complex<f64>] {
+        &self.bins
     }
-    // A real signal's mean and Nyquist components are real; the inverse insists on it.
-    if inverse.process(&mut bins, &mut extended).is_err() {
-        return middle;
+
+    /// Frequency of component `index`, hertz.
+    #[must_use]
+    pub fn frequency_hz(&self, index: usize) -> f64 {
+        index as f64 * self.df_hz
     }
-    extended.truncate(n);
-    extended
+
+    /// Mean square of a component of white noise of unit variance.
+    #[must_use]
+    pub fn unit_power(&self) -> f64 {
+        2.0 * self.middle.len() as f64
+    }
+
+    /// A record from other components, as many as [`Self::bins`].
+    #[must_use]
+    pub fn rebuilt(&self, mut bins: Vec<Complex<f64>>) -> Vec<f64> {
+        let length = 2 * self.middle.len();
+        let inverse = RealFftPlanner::<f64>::new().plan_fft_inverse(length);
+        bins.iter_mut().for_each(|bin| *bin /= length as f64);
+        let mut extended = inverse.make_output_vec();
+        // A real signal's mean and Nyquist components are real; the inverse insists on it.
+        for end in [0, bins.len().saturating_sub(1)] {
+            if let Some(bin) = bins.get_mut(end) {
+                bin.im = 0.0;
+            }
+        }
+        if inverse.process(&mut bins, &mut extended).is_err() {
+            return self.middle.clone();
+        }
+        extended.truncate(self.middle.len());
+        extended
+    }
 }
 
 /// 0 well under `edge_hz`, 1 well above, a raised cosine between.

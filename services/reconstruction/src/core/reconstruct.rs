@@ -20,7 +20,7 @@ use super::plane::{self, Match, PlaneError};
 use super::rectify::{RectifiedRig, Rectifier, RectifyError};
 use super::refine::Refiner;
 use super::scatter::Scatter;
-use super::tilt::TiltFilter;
+use super::tilt::{TiltCorrection, TiltFilter};
 
 /// What the chain can be told.
 #[derive(Debug, Clone, PartialEq)]
@@ -164,12 +164,12 @@ impl Reconstructor {
             None => WorldFromRectified::from_plane(&plane),
         };
         let sampling = self.place_points(&plane, &rig, &world);
-        let sigma_m = self.level_surface(pair, &plane, &world);
+        let tilt = self.level_surface(pair, &plane, &world);
         let mut grid = self.gridder.grid(&self.points, self.settings.cell_m, sampling)?;
         self.scatter.apply(&mut grid, sampling.window_m);
         let level_m = remove_mean(&mut grid);
         let coverage = self.cover(&grid, &plane, &world, &rig);
-        self.spread_tilt(&mut grid, sigma_m);
+        self.spread_tilt(&mut grid, tilt.sigma);
         let level = match &pair.pose {
             Some(pose) => {
                 let centre = self.centre();
@@ -192,6 +192,10 @@ impl Reconstructor {
             points: self.points.len() as u32,
             level_m: level.map(|(level_m, _)| level_m),
             level_sigma_m: level.map(|(_, sigma_m)| sigma_m),
+            error_length_m: sampling.window_m,
+            slope_removed: tilt.slope.into(),
+            slope_sigma: tilt.sigma,
+            attitude_sigma_rad: pair.pose.as_ref().map_or(0.0, |pose| pose.attitude_sigma_rad),
             level_thesis_m: pair.pose.as_ref().map(|pose| level_by_thesis_m(pose, self.mean_depth_m)),
             processing_s: 0.0,
         })
@@ -342,9 +346,9 @@ impl Reconstructor {
         }
     }
 
-    /// Takes out the tilt that the attitude's error explains; returns the standard deviation of the slope that remains wrong.
-    fn level_surface(&mut self, pair: &StereoPair, plane: &Plane, world: &WorldFromRectified) -> f64 {
-        let Some(pose) = &pair.pose else { return 0.0 };
+    /// Takes out the tilt that the attitude's error explains; returns what that was.
+    fn level_surface(&mut self, pair: &StereoPair, plane: &Plane, world: &WorldFromRectified) -> TiltCorrection {
+        let Some(pose) = &pair.pose else { return TiltCorrection { slope: Vector2::zeros(), sigma: 0.0 } };
         let normal = world.rotation * plane.normal;
         // Points on the plane have n · P = const; with up = −down its slope is n_north / n_down, n_east / n_down.
         let slope = Vector2::new(normal.x / normal.z, normal.y / normal.z);
@@ -356,7 +360,7 @@ impl Reconstructor {
             let offset = Vector2::new(point.north_m, point.east_m) - centre;
             point.up_m -= correction.slope.dot(&offset) as f32;
         }
-        correction.sigma
+        correction
     }
 
     /// Side of the window that one disparity is made of, pixels.

@@ -16,6 +16,7 @@
 //! cannot resolve count as noise: to a cell, they are.
 
 use halcyon_model::ElevationGrid;
+use halcyon_model::grid_error::covariance;
 
 /// The factor (of variance) before anything is seen …
 const PRIOR: f64 = 1.7;
@@ -98,24 +99,8 @@ fn difference(grid: &ElevationGrid, (row, col): (usize, usize), step: usize) -> 
 /// What the second difference along one axis over places `step_m` apart does to noise variance, when points closer than `window_m`
 /// share errors: 6 for independent cells, less where windows overlap.
 fn noise_gain(step_m: f64, cell_m: f64, window_m: f64) -> f64 {
-    let [own, next, second] = [0.0, 1.0, 2.0].map(|lag| shared(lag * step_m, cell_m, window_m));
+    let [own, next, second] = [0.0, 1.0, 2.0].map(|lag| covariance(lag * step_m, cell_m, window_m));
     ((6.0 * own - 8.0 * next + 2.0 * second) / own).max(1e-3)
-}
-
-/// Covariance of the means over two cells of side `cell_m`, `lag_m` apart, of a process with triangular correlation of half-width
-/// `window_m` and unit variance: the mean of the triangle over the distances between their points.
-fn shared(lag_m: f64, cell_m: f64, window_m: f64) -> f64 {
-    const STEPS: i32 = 200;
-    let triangle = |x: f64| (1.0 - x.abs()).max(0.0);
-    (0..STEPS)
-        .map(|i| {
-            // Differences of two uniform places have a triangular density on −1 … 1 cells.
-            let u = 2.0 * (f64::from(i) + 0.5) / f64::from(STEPS) - 1.0;
-            triangle(u) * triangle((lag_m + u * cell_m) / window_m.max(1e-9))
-        })
-        .sum::<f64>()
-        * 2.0
-        / f64::from(STEPS)
 }
 
 #[cfg(test)]

@@ -1,8 +1,9 @@
 //! Virtual gauges: spots of water that are read from patch after patch.
 
-use halcyon_model::{ElevationGrid, LocalPoint};
+use halcyon_model::{ElevationGrid, LocalPoint, SurfacePatch};
 
 use super::patch::cell;
+use super::smooth::{SMOOTHINGS, Smoother};
 
 /// Gauges along each side of the layout.
 const SIDE: usize = 3;
@@ -18,10 +19,22 @@ const MISSES_MAX: u32 = 10;
 pub(crate) struct Reading {
     /// Which gauge: a new number each time that a gauge is placed.
     pub gauge: u64,
+    /// Where it is.
+    pub place: LocalPoint,
+    /// Of the cells right there, and of ever larger discs around; one that cannot be had is the same as the one before.
+    pub samples: [Sample; SMOOTHINGS],
+}
+
+/// An elevation with its error.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Sample {
     /// Above the patch's own mean level, metres.
     pub elevation_m: f64,
     /// One standard deviation, metres.
     pub sigma_m: f64,
+    /// The matcher's part of its variance, m². The rest is tilt that the attitude leaves in doubt: it has been weighed against the waves'
+    /// own, so that it takes from them as much as it adds.
+    pub noise_m2: f64,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -40,8 +53,10 @@ pub(crate) struct Gauges {
 }
 
 impl Gauges {
-    /// Reads every gauge from `grid`.
-    pub(crate) fn read(&mut self, grid: &ElevationGrid) -> [Option<Reading>; GAUGES] {
+    /// Reads every gauge from `patch`.
+    pub(crate) fn read(&mut self, patch: &SurfacePatch) -> [Option<Reading>; GAUGES] {
+        let grid = &patch.grid;
+        let smoother = Smoother::new(patch);
         let mut readings = [None; GAUGES];
         for (slot, reading) in readings.iter_mut().enumerate() {
             let gauge = match self.placed[slot] {
@@ -52,7 +67,11 @@ impl Gauges {
                 }
             };
             let seen = interpolate(grid, gauge.place);
-            *reading = seen.map(|(elevation_m, sigma_m)| Reading { gauge: gauge.number, elevation_m, sigma_m });
+            *reading = seen.map(|(elevation_m, sigma_m)| Reading {
+                gauge: gauge.number,
+                place: gauge.place,
+                samples: smoother.samples(gauge.place, elevation_m, sigma_m),
+            });
             let misses = if seen.is_some() { 0 } else { gauge.misses + 1 };
             self.placed[slot] = Some(Gauge { misses, ..gauge });
         }
@@ -140,6 +159,7 @@ fn catmull_rom(t: f64) -> [f64; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::core::patch::tests::patch;
 
     fn grid(north_m: f64, f: impl Fn(f64, f64) -> f32) -> ElevationGrid {
         let (rows, cols, cell_m) = (21_u32, 31_u32, 0.1);
@@ -155,15 +175,15 @@ mod tests {
         let plane = |n: f64, e: f64| (0.3 * n - 0.2 * e) as f32;
         // Between cells as well as on them: Catmull-Rom's cubic is exact for a plane.
         let mut gauges = Gauges::default();
-        let first = gauges.read(&grid(0.0, plane));
-        let moved = gauges.read(&grid(0.33, plane));
+        let first = gauges.read(&patch(&grid(0.0, plane), 0.1, 0.0));
+        let moved = gauges.read(&patch(&grid(0.33, plane), 0.1, 0.0));
         for (a, b) in first.iter().zip(&moved) {
             let (a, b) = (a.unwrap(), b.unwrap());
             assert_eq!(a.gauge, b.gauge);
-            assert!((a.elevation_m - b.elevation_m).abs() < 1e-6);
+            assert!((a.samples[0].elevation_m - b.samples[0].elevation_m).abs() < 1e-6);
         }
         // One metre north: the southern three (at 0.5 m) are left behind, the others stay.
-        let further = gauges.read(&grid(1.0, plane));
+        let further = gauges.read(&patch(&grid(1.0, plane), 0.1, 0.0));
         let kept = first.iter().zip(&further).filter(|(a, b)| a.unwrap().gauge == b.unwrap().gauge).count();
         assert_eq!(kept, 6);
     }

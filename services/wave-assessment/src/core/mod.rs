@@ -16,6 +16,7 @@ mod hidden;
 mod patch;
 mod sampling;
 mod series;
+mod smooth;
 mod statistics;
 mod verdict;
 mod window;

@@ -151,3 +151,30 @@ pub(crate) fn cell(grid: &ElevationGrid, row: usize, col: usize) -> Option<(f64,
     let (elevation_m, sigma_m) = (*grid.elevation_m.get(index)?, *grid.sigma_m.get(index)?);
     (elevation_m.is_finite() && sigma_m.is_finite()).then_some((f64::from(elevation_m), f64::from(sigma_m)))
 }
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use halcyon_model::Plane;
+
+    /// A patch with this grid, whose cells share errors within `error_length_m` and whose slope is wrong by `slope_sigma`.
+    pub(crate) fn patch(grid: &ElevationGrid, error_length_m: f64, slope_sigma: f64) -> SurfacePatch {
+        SurfacePatch {
+            stamp: Stamp::from_nanos(0),
+            rig: RigId::new("r").unwrap(),
+            sequence: 0,
+            grid: grid.clone(),
+            coverage: 1.0,
+            plane: Plane { normal: nalgebra::Vector3::z(), distance_m: 5.0, rms_m: 0.01 },
+            points: 1000,
+            level_m: None,
+            level_sigma_m: None,
+            level_thesis_m: None,
+            error_length_m,
+            slope_removed: [0.0; 2],
+            slope_sigma,
+            attitude_sigma_rad: 0.003,
+            processing_s: 0.0,
+        }
+    }
+}

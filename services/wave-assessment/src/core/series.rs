@@ -4,12 +4,15 @@ use halcyon_model::{Stamp, TracePoint};
 
 use super::gauge::{CENTRE, GAUGES};
 use super::hidden::Hidden;
+use super::smooth::SMOOTHINGS;
 use super::window::Window;
 
 /// Shorter stretches at one gauge are left out, seconds: their mean takes too much of the waves away.
 const STRETCH_S_MIN: f64 = 10.0;
 /// Fewer samples than this are no stretch.
 const SAMPLES_MIN: usize = 12;
+/// The readings' stated variances are wrong by this share.
+const NOISE_DOUBT: f64 = 0.1;
 /// Outliers: this many standard deviations from the mean (thesis 7.3) …
 const OUTLIER_SIGMAS: f64 = 3.0;
 /// … that also stand out from both neighbours by this many.
@@ -44,6 +47,8 @@ pub(crate) struct Series {
     pub replaced: usize,
     /// Mean variance of the readings' own errors, m².
     pub noise_m2: f64,
+    /// Variance of waves that smoothing may have taken out, at most, m².
+    pub lost_m2: f64,
     /// The longest that one gauge was observed, seconds.
     pub observed_s: f64,
     start: Stamp,
@@ -54,13 +59,16 @@ impl Series {
     pub(crate) fn new(window: &Window, hidden: &Hidden, gap_s: f64) -> Self {
         let frames = window.frames();
         let start = frames.front().map_or_else(Stamp::default, |f| f.stamp);
-        let mut series = Self { stretches: Vec::new(), samples: 0, replaced: 0, noise_m2: 0.0, observed_s: 0.0, start };
+        let mut series =
+            Self { stretches: Vec::new(), samples: 0, replaced: 0, noise_m2: 0.0, lost_m2: 0.0, observed_s: 0.0, start };
+        let smoothing = Smoothing::of(window);
+        series.lost_m2 = smoothing.lost_m2;
         for slot in 0..GAUGES {
             // (frame, seconds, grid, hidden) of what can be used, gauge after gauge.
             let mut of_gauge: Vec<(u64, Vec<(usize, f64)>)> = Vec::new();
             for (i, frame) in frames.iter().enumerate() {
                 let Some(reading) = frame.readings[slot] else { continue };
-                if matches!(hidden, Hidden::Measured { level_m, .. } if level_m[i].is_none()) {
+                if hidden.is_missing(i) {
                     continue;
                 }
                 let point = (i, frame.stamp.seconds_since(start));
@@ -72,7 +80,7 @@ impl Series {
             let mut observed_s = 0.0;
             for (_, points) in &of_gauge {
                 for run in runs(points, gap_s) {
-                    observed_s += series.add(window, hidden, slot, run);
+                    observed_s += series.add(window, hidden, slot, run, smoothing.level);
                 }
             }
             series.observed_s = series.observed_s.max(observed_s);
@@ -84,19 +92,17 @@ impl Series {
     }
 
     /// Adds one run of readings; returns its length in seconds, 0 where it is too short.
-    fn add(&mut self, window: &Window, hidden: &Hidden, slot: usize, run: &[(usize, f64)]) -> f64 {
+    fn add(&mut self, window: &Window, hidden: &Hidden, slot: usize, run: &[(usize, f64)], level: usize) -> f64 {
         let mut stretch = Stretch { slot, times_s: Vec::new(), elevation_m: Vec::new(), elevation_upper_m: Vec::new() };
         let mut noise_m2 = 0.0;
         for (i, time_s) in run {
             let Some(reading) = window.frames()[*i].readings[slot] else { continue };
-            let (level_m, gain) = match hidden {
-                Hidden::Measured { level_m, gain, .. } => (level_m[*i].unwrap_or(0.0), *gain),
-                Hidden::Unknown => (0.0, 0.0),
-            };
+            let sample = reading.samples[level];
+            let (waves_m, all_m) = hidden.at(*i, &window.frames()[*i], reading.place);
             stretch.times_s.push(*time_s);
-            stretch.elevation_m.push(reading.elevation_m + gain * level_m);
-            stretch.elevation_upper_m.push(reading.elevation_m + level_m);
-            noise_m2 += reading.sigma_m * reading.sigma_m;
+            stretch.elevation_m.push(sample.elevation_m + waves_m);
+            stretch.elevation_upper_m.push(sample.elevation_m + all_m);
+            noise_m2 += sample.noise_m2;
         }
         let duration_s = stretch.duration_s();
         if duration_s < STRETCH_S_MIN || stretch.times_s.len() < SAMPLES_MIN {
@@ -122,6 +128,35 @@ impl Series {
             .collect();
         trace.sort_by_key(|point| point.stamp);
         trace
+    }
+}
+
+/// How far readings may be smoothed before waves are lost.
+struct Smoothing {
+    /// Which of a reading's samples to take.
+    level: usize,
+    /// What waves that it took out may contribute to the variance even so, m².
+    lost_m2: f64,
+}
+
+impl Smoothing {
+    /// The largest disc that takes out no more than noise explains. A window of chop is read cell by cell.
+    fn of(window: &Window) -> Self {
+        let readings = || window.frames().iter().flat_map(|frame| frame.readings.iter().flatten());
+        let count = readings().count().max(1) as f64;
+        let mut best = Self { level: 0, lost_m2: 0.0 };
+        for level in 1..SMOOTHINGS {
+            let taken_m2 =
+                readings().map(|r| (r.samples[0].elevation_m - r.samples[level].elevation_m).powi(2)).sum::<f64>() / count;
+            // A least-squares value and the residual beside it are uncorrelated.
+            let explained_m2 = readings().map(|r| r.samples[0].noise_m2 - r.samples[level].noise_m2).sum::<f64>() / count;
+            let doubt_m2 = explained_m2 * (NOISE_DOUBT + 2.0 * (2.0 / count).sqrt());
+            if taken_m2 > explained_m2 + doubt_m2 {
+                break;
+            }
+            best = Self { level, lost_m2: (taken_m2 - explained_m2 + doubt_m2).max(0.0) };
+        }
+        best
     }
 }
 

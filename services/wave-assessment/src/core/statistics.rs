@@ -53,7 +53,7 @@ impl Statistics {
         };
         let variance_m2 = mean_square(|s| &s.elevation_m);
         // Adding what may be hidden waves can lower the variance by chance; that is no reason to hope.
-        let upper_m2 = mean_square(|s| &s.elevation_upper_m).max(variance_m2);
+        let upper_m2 = mean_square(|s| &s.elevation_upper_m).max(variance_m2) + series.lost_m2;
         let noise_m2 = series.noise_m2;
 
         // Noise about zero makes waves that are none; a dead band against it swallows small waves that are some. Estimates are the

@@ -6,6 +6,7 @@ use std::hash::{Hash, Hasher};
 use halcyon_model::{ElevationGrid, LocalPoint, Stamp, SurfacePatch};
 
 use super::gauge::{GAUGES, Gauges, Reading};
+use super::hidden::Bend;
 use super::patch::cell;
 
 /// Never more frames than this, whatever the rate: the oldest go first.
@@ -30,6 +31,10 @@ pub(crate) struct Frame {
     pub footprint_m: f64,
     pub readings: [Option<Reading>; GAUGES],
     pub slope: Option<Slope>,
+    /// One standard deviation of roll and pitch, radians.
+    pub attitude_sigma_rad: f64,
+    /// How the patch is bent.
+    pub bend: Option<Bend>,
     /// Level by the autopilot, metres, and its standard deviation where stated.
     pub level_m: Option<f64>,
     pub level_sigma_m: Option<f64>,
@@ -62,7 +67,9 @@ impl Window {
             // patch cannot cover anything without a cell that was seen.
             coverage: if seen > 0.0 { patch.coverage } else { 0.0 },
             footprint_m: height_m.min(width_m).min((seen * height_m * width_m).sqrt()).max(grid.cell_m),
-            readings: self.gauges.read(grid),
+            readings: self.gauges.read(patch),
+            bend: Bend::of(patch),
+            attitude_sigma_rad: patch.attitude_sigma_rad,
             slope: slope(grid, slope_baseline_m),
             level_m: patch.level_m,
             level_sigma_m: patch.level_sigma_m,

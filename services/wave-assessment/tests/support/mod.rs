@@ -184,6 +184,10 @@ impl Camera {
             level_m,
             level_sigma_m: self.level_sigma_m,
             level_thesis_m: None,
+            error_length_m: 1e-3,
+            slope_removed: [0.0; 2],
+            slope_sigma: 0.0,
+            attitude_sigma_rad: 0.0,
             processing_s: 0.05,
         }
     }

@@ -1,5 +1,6 @@
 //! Where the mean level of a patch is: by the carrier's pose, or by the rig's own distance where it stands still.
 
+use halcyon_model::grid_error::inflation;
 use halcyon_model::{ElevationGrid, Plane, PoseAtExposure, RigCalibration};
 use nalgebra::Vector3;
 
@@ -55,8 +56,9 @@ pub(super) fn mean_sigma_m(grid: &ElevationGrid, window_m: f64) -> f64 {
         .filter(|sigma| sigma.is_finite())
         .fold((0.0, 0_usize), |(sum, cells), sigma| (sum + f64::from(*sigma).powi(2), cells + 1));
     let cells = cells.max(1) as f64;
-    let windows = (cells * (grid.cell_m / window_m.max(grid.cell_m)).powi(2)).max(1.0);
-    (sum / cells / windows).sqrt()
+    let mean_m2 = sum / cells;
+    // At most as uncertain as a cell: a patch within one window.
+    (mean_m2 * (inflation(grid.cell_m, window_m) / cells).min(1.0)).sqrt()
 }
 
 #[cfg(test)]
@@ -122,7 +124,9 @@ mod tests {
             elevation_m: vec![0.0; 100],
             sigma_m: vec![0.01; 100],
         };
-        assert!((mean_sigma_m(&grid(0.1), 0.05) - 0.001).abs() < 1e-9, "every cell is one window or more");
-        assert!((mean_sigma_m(&grid(0.1), 0.2) - 0.002).abs() < 1e-9, "four cells a window: 25 windows");
+        assert!((mean_sigma_m(&grid(0.1), 1e-4) - 0.001).abs() < 1e-5, "every cell is many windows");
+        // Windows as wide as a cell: 1 / (2/3) along each axis.
+        assert!((mean_sigma_m(&grid(0.1), 0.1) - 0.0015).abs() < 1e-5);
+        assert!((mean_sigma_m(&grid(0.1), 5.0) - 0.01).abs() < 1e-9, "one window for all");
     }
 }
