@@ -101,6 +101,14 @@ fn scalars(has_level: bool, is_local: bool) -> impl Iterator<Item = Scalar> {
             value: |entry| entry.coverage,
         },
         Scalar {
+            name: "error_length",
+            attributes: &[
+                ("long_name", "errors of cells closer than this are partly the same: the matching window on the water"),
+                ("units", "m"),
+            ],
+            value: |entry| entry.error_length_m,
+        },
+        Scalar {
             name: "plane_distance",
             attributes: &[("long_name", "distance of the mean water plane from the left camera"), ("units", "m")],
             value: |entry| entry.plane.distance_m,
@@ -135,19 +143,42 @@ fn scalars(has_level: bool, is_local: bool) -> impl Iterator<Item = Scalar> {
             value: |entry| entry.level_sigma_m.unwrap_or(f64::NAN),
         },
     ];
-    let thesis = Scalar {
-        name: "level_thesis",
-        attributes: &[
-            (
-                "long_name",
-                "mean level by the thesis's correction, height - distance cos(pitch) cos(roll) (7-1), for comparison",
-            ),
-            ("units", "m"),
-        ],
-        value: |entry| entry.level_thesis_m.unwrap_or(f64::NAN),
-    };
+    let carried = [
+        Scalar {
+            name: "level_thesis",
+            attributes: &[
+                (
+                    "long_name",
+                    "mean level by the thesis's correction, height - distance cos(pitch) cos(roll) (7-1), for comparison",
+                ),
+                ("units", "m"),
+            ],
+            value: |entry| entry.level_thesis_m.unwrap_or(f64::NAN),
+        },
+        Scalar {
+            name: "slope_removed_north",
+            attributes: &[
+                ("long_name", "rise per metre north taken out of the elevation as the attitude's error"),
+                ("units", "1"),
+            ],
+            value: |entry| entry.slope_removed[0],
+        },
+        Scalar {
+            name: "slope_removed_east",
+            attributes: &[
+                ("long_name", "rise per metre east taken out of the elevation as the attitude's error"),
+                ("units", "1"),
+            ],
+            value: |entry| entry.slope_removed[1],
+        },
+        Scalar {
+            name: "slope_sigma",
+            attributes: &[("long_name", "one standard deviation of the slope that is still wrong, each axis"), ("units", "1")],
+            value: |entry| entry.slope_sigma,
+        },
+    ];
     let level = level.into_iter().filter(move |_| has_level);
-    always.into_iter().chain(level).chain(std::iter::once(thesis).filter(move |_| is_local))
+    always.into_iter().chain(level).chain(carried.into_iter().filter(move |_| is_local))
 }
 
 fn normals_and_points(file: &mut FileMut, spool: &Spool) -> Result<(), Error> {

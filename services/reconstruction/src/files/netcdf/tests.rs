@@ -52,6 +52,10 @@ fn patch(stamp_ns: i64, row: i32, col: i32, rows: u32, cols: u32) -> SurfacePatc
         level_m: Some(0.125),
         level_sigma_m: Some(0.02),
         level_thesis_m: Some(0.25),
+        error_length_m: 0.16,
+        slope_removed: [0.5, -0.25],
+        slope_sigma: 0.125,
+        attitude_sigma_rad: 0.01,
         processing_s: 0.0,
     }
 }
@@ -111,6 +115,8 @@ fn drifting_patches_share_one_grid() {
     );
     let variable = file.variable("elevation").unwrap();
     assert_eq!(values("level_thesis"), [0.25; 3]);
+    let slope = ["slope_removed_north", "slope_removed_east", "slope_sigma"].map(|name| values(name)[2]);
+    assert_eq!(slope, [0.5, -0.25, 0.125], "what was taken out can be put back");
     assert_eq!(text(&variable, "units"), "m");
     assert_eq!(text(&variable, "ancillary_variables"), "elevation_sigma");
     assert!(variable.fill_value::<f32>().unwrap().unwrap().is_nan());
