@@ -5,7 +5,7 @@ FROM ${BASE}
 RUN apt-get update -qq \
  && apt-get install -y -qq --no-install-recommends \
       libopencv-calib3d406 libopencv-features2d406 libopencv-flann406 libopencv-imgcodecs406 libopencv-imgproc406 \
-      libopencv-videoio406 libopencv-core406 libsqlite3-0 \
+      libopencv-videoio406 libopencv-core406 libnetcdf19 libsqlite3-0 \
  && rm -rf /var/lib/apt/lists/* \
  && useradd --system --create-home --home-dir /var/lib/halcyon halcyon
 COPY halcyon /usr/local/bin/halcyon

@@ -4,7 +4,7 @@
 .PHONY: help run test lint format setup web samples docker clean
 
 APT := libopencv-core-dev libopencv-calib3d-dev libopencv-imgcodecs-dev libopencv-imgproc-dev libopencv-features2d-dev \
-       libopencv-videoio-dev libopencv-flann-dev clang libclang-dev libsqlite3-dev pkg-config
+       libopencv-videoio-dev libopencv-flann-dev clang libclang-dev libnetcdf-dev libsqlite3-dev pkg-config
 APT_TEST := chromium python3-venv
 SUDO := $(if $(filter 0,$(shell id -u)),,sudo)
 PYTHON := target/venv/bin/python

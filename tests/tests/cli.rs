@@ -63,6 +63,40 @@ fn the_aloe_pair_matches_its_ground_truth() {
 }
 
 #[test]
+fn a_rendered_survey_becomes_elevation_maps() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let survey = folder.path().join("survey");
+    let survey = survey.to_str().expect("text");
+    let (grid, wass) = (folder.path().join("g.nc"), folder.path().join("w.nc"));
+    let rendered = halcyon(&["sim", "render", survey, "--seconds", "0.6", "--rate-hz", "5", "--sea", "jonswap:0.05,1.3"]);
+    assert_eq!(rendered.status.code(), Some(0), "{}", String::from_utf8_lossy(&rendered.stderr));
+    std::fs::remove_file(PathBuf::from(survey).join("right/000001.png")).expect("a picture");
+    let outputs = ["--grid", grid.to_str().expect("text"), "--wass", wass.to_str().expect("text")];
+    let report = json(&halcyon(&[&["reconstruct", survey, "--json"][..], &outputs].concat()));
+    assert_eq!((&report["pairs"], &report["patches"], &report["frame"]), (&3.into(), &2.into(), &"gravity".into()));
+    assert_eq!(report["failed"][0]["name"], "000001");
+    assert!(report["patch"]["coverage"].as_f64().expect("a number") > 0.9, "{report:#}");
+    // NetCDF-4 files are HDF5 files.
+    for path in [&grid, &wass] {
+        assert!(std::fs::read(path).expect("a file").starts_with(b"\x89HDF\r\n"), "{}", path.display());
+    }
+}
+
+#[test]
+fn a_rig_says_what_it_can_measure() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plot = folder.path().join("rig.html");
+    // The thesis's rig: 640 pixels at f = 509 px, 9.2 cm apart.
+    let rig = ["rig", "--fov-deg", "64.3", "--width", "640", "--height", "480", "--baseline-m", "0.092", "--json"];
+    let more = ["--wave-height", "0.05", "--altitudes", "0.5..5", "--plot", plot.to_str().expect("text")];
+    let report = json(&halcyon(&[&rig[..], &more].concat()));
+    assert!((report["rig"]["focal_px"].as_f64().expect("a number") - 509.0).abs() < 1.0, "{report:#}");
+    assert!(report["best"][0]["altitude_m"].as_f64().expect("a number") > 0.5, "{report:#}");
+    let page = std::fs::read_to_string(plot).expect("the page is written");
+    assert!(page.starts_with("<!doctype html>") && page.matches("<svg").count() == 3);
+}
+
+#[test]
 fn careless_use_is_refused_with_one_line() {
     let folder = tempfile::tempdir().expect("a folder");
     let text: PathBuf = folder.path().join("text.jpg");
@@ -80,6 +114,20 @@ fn careless_use_is_refused_with_one_line() {
         refused(&[&pair[..], &[bad]].concat(), "disparity");
     }
     refused(&["match", "--left", text, "--right", text, "--out", "x.pfm", "--max-disparity", "64"], "text.jpg");
+    let pair = ["reconstruct", "--left", text, "--right", text, "--rig"];
+    refused(&[&pair[..], &["no-such-rig.yaml"]].concat(), "no-such-rig.yaml");
+    refused(&[&pair[..], &[text]].concat(), "text.jpg");
+    refused(&[&pair[..], &[text, "--height-m", "nan"]].concat(), "--height-m");
+    refused(&[&pair[..], &[text, "--roll-deg", "3"]].concat(), "--height-m");
+    refused(&["reconstruct"], "--left");
+    refused(&["reconstruct", "no-such-folder"], "no-such-folder");
+    refused(&["reconstruct", "no-such-folder", "--left", text], "cannot be used with");
+    refused(&["rig"], "--fov-deg");
+    refused(&["rig", "--rig", text], "text.jpg");
+    let plan = ["rig", "--fov-deg", "60", "--width", "640", "--height", "480", "--baseline-m"];
+    refused(&[&plan[..], &["-1"]].concat(), "baseline");
+    refused(&[&plan[..], &["0.1", "--altitudes", "-5..nan"]].concat(), "altitudes");
+    refused(&[&plan[..], &["0.1", "--plot", "rig.pdf"]].concat(), ".svg or .html");
     refused(&["up", "--sea", "lumpy"], "sea");
     refused(&["up", "--sea", "jonswap:nan,1"], "height");
     refused(&["up", "--speed", "0"], "speed");
@@ -93,9 +141,18 @@ fn careless_use_is_refused_with_one_line() {
 
 #[test]
 fn every_command_explains_itself_with_an_example() {
-    for command in
-        [&["up"][..], &["run"], &["calibrate"], &["match"], &["mission"], &["config"], &["sim", "render"], &["sim", "serve"]]
-    {
+    for command in [
+        &["up"][..],
+        &["run"],
+        &["calibrate"],
+        &["match"],
+        &["reconstruct"],
+        &["rig"],
+        &["mission"],
+        &["config"],
+        &["sim", "render"],
+        &["sim", "serve"],
+    ] {
         let output = halcyon(&[command, &["--help"]].concat());
         let text = String::from_utf8_lossy(&output.stdout);
         assert!(output.status.success() && text.contains("Example: halcyon"), "{command:?}: {text}");

@@ -78,6 +78,18 @@ pub struct Frame {
 }
 
 impl Frame {
+    /// The left picture.
+    #[must_use]
+    pub fn left(&self) -> &Path {
+        &self.left
+    }
+
+    /// The right picture.
+    #[must_use]
+    pub fn right(&self) -> &Path {
+        &self.right
+    }
+
     /// Mid-exposure.
     #[must_use]
     pub fn stamp(&self) -> Stamp {
@@ -103,6 +115,22 @@ impl SurveyFolder {
     /// # Errors
     /// [`FolderError`], naming the file and, where it has lines, the line.
     pub fn open(folder: &Path) -> Result<Self, FolderError> {
+        Self::open_with(folder, find_picture)
+    }
+
+    /// As [`Self::open`], but a picture that is missing is found out when it is read: for those who count bad pairs and go on.
+    ///
+    /// # Errors
+    /// [`FolderError`] for `rig.yaml` and `frames.csv`.
+    pub fn open_tolerant(folder: &Path) -> Result<Self, FolderError> {
+        let expected = |side: &Path, name: &str| side.join(format!("{name}.{}", ENDINGS[0]));
+        Self::open_with(folder, |side, name| Ok(find_picture(side, name).unwrap_or_else(|_| expected(side, name))))
+    }
+
+    fn open_with(
+        folder: &Path,
+        find_picture: impl Fn(&Path, &str) -> Result<PathBuf, FolderError>,
+    ) -> Result<Self, FolderError> {
         let rig_path = folder.join("rig.yaml");
         let text = read_text(&rig_path, rig_yaml::TEXT_BYTES_MAX as u64)?;
         let rig = rig_yaml::parse(&text).map_err(|source| FolderError::Rig { path: rig_path, source })?;

@@ -120,3 +120,18 @@ fn every_defect_is_named_with_its_file_and_line() {
     let other_size = |f: &Path| edit(f, "rig.yaml", "[ 64, 48 ]", "[ 64, 50 ]");
     assert_eq!(broken(other_size), "left/000000.png: 64 x 48 px, but the rig takes 64 x 50 px");
 }
+
+#[test]
+fn tolerance_leaves_a_missing_picture_to_its_reader() {
+    let folder = tempfile::tempdir().unwrap();
+    render(folder.path(), 3);
+    fs::remove_file(folder.path().join("right/000001.png")).unwrap();
+    assert!(SurveyFolder::open(folder.path()).is_err());
+    let survey = SurveyFolder::open_tolerant(folder.path()).unwrap();
+    let whole: Vec<bool> = survey.frames().iter().map(|frame| survey.read(frame).is_ok()).collect();
+    assert_eq!(whole, [true, false, true]);
+    assert_eq!(survey.frames()[1].right(), folder.path().join("right/000001.png"));
+    assert_eq!(survey.frames()[1].left(), folder.path().join("left/000001.png"));
+    fs::remove_file(folder.path().join("frames.csv")).unwrap();
+    assert!(SurveyFolder::open_tolerant(folder.path()).is_err(), "without its table it is no survey");
+}

@@ -16,6 +16,8 @@ mod container;
 mod decode;
 mod glob;
 mod grey;
+pub mod netcdf;
+pub mod ply;
 mod pnm;
 mod rig;
 mod truth;
@@ -187,26 +189,39 @@ fn is_device(_: std::fs::FileType) -> bool {
     false
 }
 
-/// Writes a result as a whole: into a file beside it first, so that a full disk leaves no half result under the name.
-pub(crate) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
-    let write = |source| FileError::Write { path: path.into(), source };
-    let name = path.file_name().ok_or_else(|| write(std::io::Error::from(std::io::ErrorKind::InvalidInput)))?;
-    if path.is_dir() {
-        return Err(write(std::io::Error::from(std::io::ErrorKind::IsADirectory)));
+/// Writes a result as a whole: under a temporary name beside it first, so that neither a full disk nor a crash leaves half a result
+/// under its name. A device or a pipe is written as it is.
+///
+/// # Errors
+/// [`FileError::Write`].
+pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
+    if path.exists() && !path.is_file() && !path.is_dir() {
+        return std::fs::write(path, bytes).map_err(|source| FileError::Write { path: path.into(), source });
     }
-    // A device or a pipe is written as it is; there is nothing to rename over it.
+    write_whole(path, |partial| std::fs::write(partial, bytes))
+}
+
+/// Lets `write` make a file under a temporary name beside `path`, then renames it: neither a full disk nor a crash leaves half a
+/// result under the name.
+pub(crate) fn write_whole(path: &Path, write: impl FnOnce(&Path) -> std::io::Result<()>) -> Result<(), FileError> {
+    let failed = |source| FileError::Write { path: path.into(), source };
+    let name = path.file_name().ok_or_else(|| failed(std::io::Error::from(std::io::ErrorKind::InvalidInput)))?;
+    if path.is_dir() {
+        return Err(failed(std::io::Error::from(std::io::ErrorKind::IsADirectory)));
+    }
+    // There is nothing to rename over a device or a pipe.
     if path.exists() && !path.is_file() {
-        return std::fs::write(path, bytes).map_err(write);
+        return Err(failed(std::io::Error::from(std::io::ErrorKind::InvalidInput)));
     }
     let mut partial = name.to_owned();
     partial.push(format!(".{}.partial", std::process::id()));
     let partial = path.with_file_name(partial);
-    let done = std::fs::write(&partial, bytes).and_then(|()| std::fs::rename(&partial, path));
+    let done = write(&partial).and_then(|()| std::fs::rename(&partial, path));
     if done.is_err() {
         // Best effort: what matters is the first error.
         let _ = std::fs::remove_file(&partial);
     }
-    done.map_err(write)
+    done.map_err(failed)
 }
 
 fn decode_picture(path: &Path, bytes: &[u8]) -> Result<Grey, FileError> {

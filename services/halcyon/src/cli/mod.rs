@@ -5,6 +5,8 @@ mod config;
 mod matching;
 mod mission;
 mod output;
+mod reconstruct;
+mod rig;
 mod run;
 mod sim;
 mod up;
@@ -35,6 +37,10 @@ enum Command {
     Calibrate(calibrate::Args),
     /// Match a rectified pair of pictures to a disparity map
     Match(matching::Args),
+    /// Measure the water surface in a raw pair of pictures, or in every pair of a survey folder
+    Reconstruct(reconstruct::Args),
+    /// Say what a rig can measure, from which altitude: footprint, noise, smallest waves, best altitude
+    Rig(rig::Args),
     /// Create, watch and command missions of a running fleet
     Mission(mission::Args),
     /// Simulate: render water to a survey folder, or serve vehicles over MAVLink
@@ -52,6 +58,8 @@ pub fn main() -> ExitCode {
         Command::Run(args) => run::run(&options, &args),
         Command::Calibrate(args) => calibrate::run(&args),
         Command::Match(args) => matching::run(&args),
+        Command::Reconstruct(args) => reconstruct::run(&args),
+        Command::Rig(args) => rig::run(&args),
         Command::Mission(args) => mission::run(args),
         Command::Sim(args) => sim::run(&options, args),
         Command::Config(args) => config::run(&options, &args),

@@ -46,6 +46,7 @@ pub struct Chart {
     from_zero: bool,
     log_y: bool,
     equal_scales: bool,
+    low_legend: bool,
 }
 
 impl Chart {
@@ -58,6 +59,7 @@ impl Chart {
             from_zero: false,
             log_y: false,
             equal_scales: false,
+            low_legend: false,
         }
     }
 
@@ -79,6 +81,13 @@ impl Chart {
     #[must_use]
     pub fn log_y(mut self) -> Self {
         self.log_y = true;
+        self
+    }
+
+    /// Names the series in the lower right corner: for curves that rise.
+    #[must_use]
+    pub fn low_legend(mut self) -> Self {
+        self.low_legend = true;
         self
     }
 
@@ -114,7 +123,9 @@ impl Chart {
         let mut builder = ChartBuilder::on(&area);
         builder.margin(12).x_label_area_size(44).y_label_area_size(68);
         let mut chart = builder.build_cartesian_2d(x.0..x.1, y.0..y.1).map_err(ChartError::draw)?;
-        let y_text = |y: &f64| scale::label(if self.log_y { 10_f64.powf(*y) } else { *y });
+        // On a logarithmic axis two digits tell all, and four would run into the axis's name.
+        let two_digits = |value: f64| format!("{value:.1e}").parse().unwrap_or(value);
+        let y_text = |y: &f64| scale::label(if self.log_y { two_digits(10_f64.powf(*y)) } else { *y });
         chart
             .configure_mesh()
             .x_desc(&self.x_label)
@@ -158,7 +169,7 @@ impl Chart {
         if self.series.iter().any(|series| !series.name.is_empty()) {
             chart
                 .configure_series_labels()
-                .position(SeriesLabelPosition::UpperRight)
+                .position(if self.low_legend { SeriesLabelPosition::LowerRight } else { SeriesLabelPosition::UpperRight })
                 .background_style(WHITE.mix(0.85))
                 .border_style(BLACK.mix(0.2))
                 .label_font(("sans-serif", 13))

@@ -2,15 +2,18 @@
 
 pub mod calibrate;
 pub mod camera;
+pub mod cloud;
 mod cv;
 pub mod disparity;
 pub mod grid;
 pub mod matcher;
+pub mod mesh;
 pub mod plane;
 pub mod reconstruct;
 pub mod rectify;
 pub mod refine;
 mod resample;
+pub mod rig_budget;
 mod scatter;
 pub mod study;
 pub mod tilt;

@@ -228,6 +228,18 @@ impl Reconstructor {
         &self.disparity
     }
 
+    /// The matches of the last pair that belong to the water, row by row; outliers are gone.
+    #[must_use]
+    pub fn matches(&self) -> &[Match] {
+        &self.matches
+    }
+
+    /// The left picture of the last pair, rectified, 8-bit.
+    #[must_use]
+    pub fn left_grey(&self) -> Option<&opencv::core::Mat> {
+        self.rectifier.as_ref().map(|rectifier| rectifier.grey().0)
+    }
+
     /// The rectified cameras of the last pair.
     #[must_use]
     pub fn rectified_rig(&self) -> Option<&RectifiedRig> {

@@ -1,0 +1,242 @@
+//! `halcyon reconstruct`
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use halcyon_capture::SurveyFolder;
+use halcyon_chassis::clock::{Clock, ClockConfig};
+use halcyon_model::PoseAtExposure;
+use halcyon_reconstruction::cli::{self, MeshOf, PatchReport, PlaneReport, ReconstructOptions, SurveyFrame};
+
+use super::{bad_input, output};
+
+/// Measure the water surface in a raw pair of pictures, or in every pair of a survey folder
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Example: halcyon reconstruct --left l.png --right r.png --rig rig.yaml --height-m 5 --cloud c.ply --mesh m.ply
+Example: halcyon reconstruct survey --grid elevation.nc --wass wass.nc
+
+Without a height the pictures' own mean plane is level. A survey folder has rig.yaml, left/, right/ and frames.csv; its bad
+pairs are named and passed over."
+)]
+pub(super) struct Args {
+    /// A survey folder: every pair of it
+    #[arg(value_name = "DIR", conflicts_with_all = ["left", "right", "rig", "height_m"])]
+    folder: Option<PathBuf>,
+    /// Left picture, as taken
+    #[arg(long, value_name = "FILE", required_unless_present = "folder")]
+    left: Option<PathBuf>,
+    /// Right picture, as taken
+    #[arg(long, value_name = "FILE", required_unless_present = "folder")]
+    right: Option<PathBuf>,
+    /// The rig's calibration, OpenCV YAML
+    #[arg(long, value_name = "FILE", required_unless_present = "folder")]
+    rig: Option<PathBuf>,
+    #[command(flatten)]
+    pose: Pose,
+    #[command(flatten)]
+    how: How,
+    #[command(flatten)]
+    outputs: Outputs,
+    /// Print the result as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Where the body was, for one pair.
+#[derive(Debug, clap::Args)]
+struct Pose {
+    /// Height of the body above the mean water, metres
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    height_m: Option<f64>,
+    /// Roll, degrees
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true, requires = "height_m")]
+    roll_deg: f64,
+    /// Pitch, degrees
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true, requires = "height_m")]
+    pitch_deg: f64,
+    /// Heading, degrees clockwise from true north
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true, requires = "height_m")]
+    heading_deg: f64,
+    /// One standard deviation of heights, metres
+    #[arg(long, value_name = "M", default_value_t = 0.3, allow_negative_numbers = true)]
+    height_sigma_m: f64,
+    /// One standard deviation of roll and pitch, degrees
+    #[arg(long, value_name = "DEG", default_value_t = 0.5, allow_negative_numbers = true)]
+    attitude_sigma_deg: f64,
+}
+
+#[derive(Debug, clap::Args)]
+struct How {
+    /// bm, sgbm, sgbm-3way or sgbm-hh
+    #[arg(long, default_value = "sgbm")]
+    engine: String,
+    /// Cell of the elevation grid, metres; otherwise about ten pixels
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    cell: Option<f64>,
+    /// Every so many pixels become a point; otherwise 1 for a pair, 2 for a survey
+    #[arg(long, value_name = "PX")]
+    stride: Option<u32>,
+    /// Largest disparity of a full search, pixels; otherwise 40 % of the width
+    #[arg(long, value_name = "PX")]
+    max_disparity: Option<u32>,
+}
+
+#[derive(Debug, clap::Args)]
+struct Outputs {
+    /// Write the point cloud, PLY
+    #[arg(long, value_name = "FILE.ply")]
+    cloud: Option<PathBuf>,
+    /// Write a triangle mesh, PLY
+    #[arg(long, value_name = "FILE.ply")]
+    mesh: Option<PathBuf>,
+    /// What the mesh is made of: the cloud's points, or the smoother elevation grid
+    #[arg(long, value_enum, default_value_t = MeshFrom::Cloud)]
+    mesh_of: MeshFrom,
+    /// Write the disparity map: .pfm (numbers, NaN for no match) or .png (colours)
+    #[arg(long, value_name = "FILE")]
+    disparity: Option<PathBuf>,
+    /// Write elevation maps over time, NetCDF-4 with CF names
+    #[arg(long, value_name = "FILE.nc")]
+    grid: Option<PathBuf>,
+    /// Write them in the layout of WASS
+    #[arg(long, value_name = "FILE.nc")]
+    wass: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum MeshFrom {
+    Cloud,
+    Grid,
+}
+
+pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    let options = options(args);
+    match (&args.folder, &args.left, &args.right, &args.rig) {
+        (Some(folder), ..) => survey(folder, args, &options),
+        (None, Some(left), Some(right), Some(rig)) => pair(left, right, rig, args, &options),
+        // The command line demands them.
+        _ => Err(halcyon_chassis::ConfigError::new("give a survey folder, or --left, --right and --rig".to_owned()).into()),
+    }
+}
+
+fn options(args: &Args) -> ReconstructOptions {
+    let (how, outputs) = (&args.how, &args.outputs);
+    // As typed, but without the paths of the machine it was typed on.
+    let words = std::env::args_os().skip(1).map(|word| match Path::new(&word).file_name() {
+        Some(name) if Path::new(&word).is_absolute() => name.to_string_lossy().into_owned(),
+        _ => word.to_string_lossy().into_owned(),
+    });
+    ReconstructOptions {
+        engine: how.engine.clone(),
+        cell_m: how.cell,
+        stride_px: how.stride,
+        max_disparity_px: how.max_disparity,
+        cloud: outputs.cloud.clone(),
+        mesh: outputs.mesh.clone(),
+        mesh_of: if outputs.mesh_of == MeshFrom::Grid { MeshOf::Grid } else { MeshOf::Cloud },
+        disparity: outputs.disparity.clone(),
+        grid: outputs.grid.clone(),
+        wass: outputs.wass.clone(),
+        now: Clock::new(&ClockConfig::default()).now(),
+        command: format!("halcyon {}", words.collect::<Vec<_>>().join(" ")),
+    }
+}
+
+fn pair(left: &Path, right: &Path, rig: &Path, args: &Args, options: &ReconstructOptions) -> anyhow::Result<ExitCode> {
+    let pose = args.pose.given().map_err(bad_input)?;
+    let spinner = output::spinner();
+    spinner.set_message("reconstructing");
+    let report = cli::reconstruct_pair(left, right, rig, pose, options);
+    spinner.finish_and_clear();
+    let report = report.map_err(bad_input)?;
+    if args.json {
+        output::json(&report)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    output::line(&format!(
+        "points     {} of {} x {} px, {:.0} ms",
+        report.points, report.width_px, report.height_px, report.wall_ms
+    ))?;
+    surface(&report.plane, &report.patch)?;
+    written(options)
+}
+
+fn survey(folder: &Path, args: &Args, options: &ReconstructOptions) -> anyhow::Result<ExitCode> {
+    // Checks the standard deviations: the folder has the rest.
+    cli::given_pose([0.0; 3], 1.0, args.pose.height_sigma_m, args.pose.attitude_sigma_deg).map_err(bad_input)?;
+    let survey = SurveyFolder::open_tolerant(folder).map_err(bad_input)?;
+    let frame = |frame: &halcyon_capture::Frame| SurveyFrame {
+        name: frame.row.name.clone(),
+        stamp: frame.stamp(),
+        left: frame.left().to_owned(),
+        right: frame.right().to_owned(),
+        pose: frame.pose(args.pose.height_sigma_m, args.pose.attitude_sigma_deg.to_radians()),
+    };
+    let frames: Vec<SurveyFrame> = survey.frames().iter().map(frame).collect();
+    let bar = output::bar("pairs");
+    let mut progress = |done: usize, total: usize, failure: Option<&cli::FailedPair>| {
+        bar.set_length(total as u64);
+        bar.set_position(done as u64);
+        if let Some(failure) = failure {
+            bar.println(format!("left out   {}: {}", failure.name, failure.why));
+        }
+    };
+    let report = cli::reconstruct_survey(survey.rig(), &frames, options, &mut progress);
+    bar.finish_and_clear();
+    let report = report.map_err(bad_input)?;
+    if args.json {
+        output::json(&report)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    for failure in &report.failed {
+        output::line(&format!("left out   {}: {}", failure.name, failure.why))?;
+    }
+    output::line(&format!(
+        "patches    {} of {} pairs, {:.1} s, {:.0} points each, {:.0} ms a pair",
+        report.patches,
+        report.pairs,
+        report.duration_s,
+        report.points,
+        report.wall_ms / report.patches as f64
+    ))?;
+    surface(&report.plane, &report.patch)?;
+    written(options)
+}
+
+impl Pose {
+    fn given(&self) -> Result<Option<PoseAtExposure>, cli::ReconstructCliError> {
+        let attitude_deg = [self.roll_deg, self.pitch_deg, self.heading_deg];
+        let pose = |height_m| cli::given_pose(attitude_deg, height_m, self.height_sigma_m, self.attitude_sigma_deg);
+        self.height_m.map(pose).transpose()
+    }
+}
+
+fn surface(plane: &PlaneReport, patch: &PatchReport) -> anyhow::Result<()> {
+    let [x, y, z] = plane.normal;
+    output::line(&format!(
+        "plane      {:.4} m from the left camera, normal ({x:.4}, {y:.4}, {z:.4}), RMS {:.2} mm",
+        plane.distance_m,
+        plane.rms_m * 1e3
+    ))?;
+    output::line(&format!(
+        "patch      {} x {} cells of {} m, {:.1} % measured, sigma {:.2} mm, elevation RMS {:.2} mm",
+        patch.rows,
+        patch.cols,
+        patch.cell_m,
+        patch.coverage * 100.0,
+        patch.sigma_m * 1e3,
+        patch.elevation_rms_m * 1e3
+    ))?;
+    if let (Some(level_m), Some(low_m), Some(high_m)) = (patch.level_m, patch.level_m_low, patch.level_m_high) {
+        output::line(&format!("level      {level_m:.3} m above the datum ({low_m:.3} to {high_m:.3})"))?;
+    }
+    Ok(())
+}
+
+fn written(options: &ReconstructOptions) -> anyhow::Result<ExitCode> {
+    for path in [&options.cloud, &options.mesh, &options.disparity, &options.grid, &options.wass].into_iter().flatten() {
+        output::line(&format!("written    {}", path.display()))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
