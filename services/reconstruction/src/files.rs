@@ -12,10 +12,12 @@ use opencv::{imgcodecs, imgproc};
 
 mod container;
 mod glob;
+mod rig;
 
 pub use container::PictureKind;
 use container::check;
 pub use glob::{GlobError, glob};
+pub use rig::{RigFileError, read_rig};
 
 /// Larger files are no pictures of a stereo rig.
 const FILE_BYTES_MAX: u64 = 512 << 20;

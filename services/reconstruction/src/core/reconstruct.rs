@@ -203,6 +203,12 @@ impl Reconstructor {
         &self.disparity
     }
 
+    /// The rectifier, which holds the last pair whose size fits its calibration, patch or no patch.
+    #[must_use]
+    pub fn rectifier(&self) -> Option<&Rectifier> {
+        self.rectifier.as_ref()
+    }
+
     /// The rectified cameras of the last pair.
     #[must_use]
     pub fn rectified_rig(&self) -> Option<&RectifiedRig> {

@@ -35,8 +35,8 @@ pub fn eight_point<'a>(pairs: impl IntoIterator<Item = &'a PointPair, IntoIter: 
     let eigen = squares.symmetric_eigen();
     let mut order: [usize; 9] = std::array::from_fn(|i| i);
     order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
-    // Negated, so that NaN is degenerate, too.
-    if !(eigen.eigenvalues[order[1]] > GAP_MIN * eigen.eigenvalues[order[8]]) {
+    let gap = eigen.eigenvalues[order[1]] / eigen.eigenvalues[order[8]];
+    if gap.is_nan() || gap <= GAP_MIN {
         return Err(EpipolarError::Degenerate);
     }
     let f = Matrix3::from_row_slice(eigen.eigenvectors.column(order[0]).as_slice());

@@ -8,7 +8,9 @@ use super::fundamental::POINTS_MIN;
 use super::{EpipolarError, PointPair, eight_point, sampson_px2};
 
 /// Rounds of least squares over the inliers, after which they are counted anew.
-const POLISH_ROUNDS: u32 = 5;
+const POLISH_ROUNDS: u32 = 8;
+/// However good the first sample, so many are drawn: the best of a few is better than the first.
+const SAMPLES_MIN: u32 = 50;
 
 /// What RANSAC can be told.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,33 +61,50 @@ pub fn find_fundamental(pairs: &[PointPair], settings: &RansacSettings) -> Resul
     let limit_px2 = settings.threshold_px * settings.threshold_px;
     let mut random = ChaCha8Rng::seed_from_u64(settings.seed);
     let mut best: Option<(f64, Matrix3<f64>)> = None;
+    let mut sample_cost = f64::INFINITY;
     let (mut samples, mut wanted) = (0, settings.samples_max);
     while samples < wanted {
         samples += 1;
         let sample = draw(&mut random, pairs.len());
         let Ok(f) = eight_point(sample.iter().map(|&i| &pairs[i])) else { continue };
         let (cost, inliers) = score(&f, pairs, limit_px2);
-        if best.is_none_or(|(least, _)| cost < least) {
-            best = Some((cost, f));
-            wanted = samples_for(inliers as f64 / pairs.len() as f64, settings);
+        // Samples compete with samples: eight noisy points seldom beat what was polished, and might still polish better.
+        if cost < sample_cost {
+            sample_cost = cost;
+            wanted = samples_for(inliers as f64 / pairs.len() as f64, settings).max(SAMPLES_MIN).min(settings.samples_max);
+            let (cost, f) = polish(f, pairs, limit_px2);
+            if best.is_none_or(|(least, _)| cost < least) {
+                best = Some((cost, f));
+            }
         }
     }
-    let (mut cost, mut f) = best.ok_or(EpipolarError::Degenerate)?;
-    for _ in 0..POLISH_ROUNDS {
-        let inliers = pairs.iter().filter(|pair| sampson_px2(&f, pair) <= limit_px2);
-        let Ok(polished) = eight_point(inliers) else { break };
-        let (new_cost, _) = score(&polished, pairs, limit_px2);
-        if new_cost >= cost {
-            break;
-        }
-        (cost, f) = (new_cost, polished);
-    }
+    let (_, f) = best.ok_or(EpipolarError::Degenerate)?;
     let is_inlier: Vec<bool> = pairs.iter().map(|pair| sampson_px2(&f, pair) <= limit_px2).collect();
     let inliers = is_inlier.iter().filter(|is_inlier| **is_inlier).count();
     if inliers < needed {
         return Err(EpipolarError::NoConsensus { inliers, points: pairs.len(), needed });
     }
     Ok(Consensus { fundamental: f, is_inlier, inliers, samples })
+}
+
+/// Least squares over the inliers, again and again as long as the cost falls (locally optimised RANSAC, Chum et al. 2003); from twice
+/// the threshold down, so that a start that fits one corner of the picture can grow to the others.
+fn polish(start: Matrix3<f64>, pairs: &[PointPair], limit_px2: f64) -> (f64, Matrix3<f64>) {
+    let mut best = (score(&start, pairs, limit_px2).0, start);
+    let mut f = start;
+    for round in 0..POLISH_ROUNDS {
+        let widen = if round < 2 { 4.0 } else { 1.0 };
+        let inliers = pairs.iter().filter(|pair| sampson_px2(&f, pair) <= widen * limit_px2);
+        let Ok(polished) = eight_point(inliers) else { break };
+        let cost = score(&polished, pairs, limit_px2).0;
+        f = polished;
+        if cost < best.0 {
+            best = (cost, f);
+        } else if round >= 2 {
+            break;
+        }
+    }
+    best
 }
 
 /// Eight different indices.

@@ -14,7 +14,8 @@ use std::collections::VecDeque;
 use nalgebra::{SMatrix, SVector};
 
 use super::median;
-use crate::core::rectify::RectifiedRig;
+use crate::core::features::{FeatureError, MatchRule, Method, detect_in, match_features};
+use crate::core::rectify::{RectifiedRig, Rectifier};
 
 type Vector5 = SVector<f64, 5>;
 type Matrix5 = SMatrix<f64, 5, 5>;
@@ -24,8 +25,9 @@ const PRIOR_RAD: f64 = 0.05;
 /// Residuals beyond this many robust standard deviations have no say (Tukey's biweight).
 const TUKEY_SIGMAS: f64 = 4.685;
 const ROUNDS: u32 = 8;
-/// Rows known better than this, pixels, are not: matches have scatter.
-const SIGMA_PX_MIN: f64 = 0.02;
+/// The scatter of rows is taken for at least this, pixels: ORB's places are whole pixels of their level, so that most rows may agree
+/// exactly, and those that don't, which hold the drift, must not pass for outliers.
+const SIGMA_PX_MIN: f64 = 0.4;
 
 /// A match of a rectified pair.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -85,10 +87,49 @@ struct PairSums {
     matches: usize,
 }
 
+/// Keypoints of each picture: few, so that a look costs milliseconds.
+const KEYPOINTS_MAX: usize = 500;
+/// Half the side of ORB's patch, pixels: nearer to what the camera did not see, descriptors see what warping invented.
+const PATCH_PX: u32 = 16;
+
+/// The matches of the pair that a rectifier holds, by ORB: cheap, and coarse places average out.
+///
+/// # Errors
+/// [`FeatureError`] for pictures too small.
+pub fn row_matches(rectifier: &Rectifier) -> Result<Vec<RowMatch>, FeatureError> {
+    let (left, right) = rectifier.grey();
+    let (left, right) = (detect_in(left, Method::Orb, KEYPOINTS_MAX)?, detect_in(right, Method::Orb, KEYPOINTS_MAX)?);
+    let (width_px, height_px) = (rectifier.rig().width_px, rectifier.rig().height_px);
+    let seen = |m: &RowMatch| {
+        let (x_px, y_px) = (m.left_x_px.round().max(0.0) as u32, m.left_y_px.round().max(0.0) as u32);
+        let disparity_px = (m.left_x_px - m.right_x_px) as f32;
+        x_px < width_px && y_px < height_px && rectifier.is_seen(x_px, y_px, disparity_px, PATCH_PX)
+    };
+    Ok(match_features(&left, &right, &MatchRule::default())
+        .iter()
+        .map(|m| {
+            let (l, r) = (&left.keypoints[m.left], &right.keypoints[m.right]);
+            RowMatch {
+                left_x_px: l.x_px.into(),
+                left_y_px: l.y_px.into(),
+                right_x_px: r.x_px.into(),
+                right_y_px: r.y_px.into(),
+            }
+        })
+        .filter(seen)
+        .collect())
+}
+
 /// Watches one rig.
 pub struct DriftWatch {
     settings: DriftSettings,
     pairs: VecDeque<PairSums>,
+}
+
+impl Default for DriftWatch {
+    fn default() -> Self {
+        Self::new(DriftSettings::default())
+    }
 }
 
 impl DriftWatch {

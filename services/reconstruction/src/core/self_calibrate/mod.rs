@@ -15,7 +15,7 @@ mod scale;
 use std::borrow::Cow;
 
 use bundle::{Bundle, Pose};
-pub use drift::{Drift, DriftSettings, DriftWatch, RowMatch};
+pub use drift::{Drift, DriftSettings, DriftWatch, RowMatch, row_matches};
 use halcyon_model::RigCalibration;
 use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, UnitVector3, Vector2, Vector3};
 pub use rows::RowErrors;
