@@ -144,7 +144,8 @@ fn drift_is_seen_in_rectified_pairs() {
 /// A board calibration of the sample pictures, and their pose again from features of the same pictures, board unknown.
 #[test]
 fn the_samples_without_their_board_agree_with_their_board() {
-    let pairs = sample_pairs();
+    // Every other pair: enough of both, in half the time.
+    let pairs: Vec<_> = sample_pairs().into_iter().step_by(2).collect();
     let board = calibrate(&pairs, BoardSpec::new(9, 6, 0.025).unwrap()).unwrap().rig;
     let matches: Vec<Vec<PointPair>> = pairs
         .iter()

@@ -8,8 +8,8 @@ use nalgebra::{Matrix3, Matrix3x4, Vector3};
 use serde::Serialize;
 
 use crate::core::epipolar::{
-    PointPair, RansacSettings, Rays, essential_from_fundamental, pixels_without_distortion, pose_from_essential,
-    projection_matrices, triangulate,
+    PointPair, RansacSettings, Rays, essential_from_fundamental, essential_from_pose, pixels_without_distortion,
+    pose_from_essential, projection_matrices, triangulate,
 };
 use crate::core::features::{
     FeatureError, FeatureStudy, KEYPOINTS_MAX, MatchRule, Method, StudySettings, UnknownMethod, encode_png, study,
@@ -93,7 +93,7 @@ pub struct FeaturesOptions<'a> {
 /// The pose in an essential matrix, as `--json` prints it. Matrices are lists of rows.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PoseReport {
-    /// E = K_rᵀ F K_l (thesis 4-26).
+    /// E = K_rᵀ F K_l (thesis 4-26), scaled to what \[t\]× R has with |t| = 1.
     pub essential: [[f64; 3]; 3],
     /// R of X_right = R X_left + t.
     pub rotation: [[f64; 3]; 3],
@@ -126,7 +126,7 @@ pub struct FeatureRow {
     pub left_after: usize,
     /// Keypoints right after RANSAC.
     pub right_after: usize,
-    /// F with p_rᵀ F p_l = 0, pixels, Frobenius norm 1; absent without a consensus. With a rig, of undistorted pixels.
+    /// F with p_rᵀ F p_l = 0, pixels, Frobenius norm 1, f₃₃ ≥ 0; absent without a consensus. With a rig, of undistorted pixels.
     pub fundamental: Option<[[f64; 3]; 3]>,
     /// With a rig.
     pub pose: Option<PoseReport>,
@@ -262,8 +262,11 @@ fn pose(study: &FeatureStudy, rig: &RigCalibration) -> Result<Option<PoseAndPoin
         .filter(|point| point.z > 0.0 && (pose.right_from_left * point + t_m).z > 0.0)
         .collect();
     let turn = nalgebra::Rotation3::from_matrix_unchecked(pose.right_from_left * rig.right_from_left.transpose());
+    // F has no scale and no sign, and so has E: give it those of its own pose.
+    let of_pose = essential_from_pose(&pose.right_from_left, &pose.direction);
+    let scaled = essential * (of_pose.dot(&essential).signum() * of_pose.norm() / essential.norm());
     let report = PoseReport {
-        essential: rows3(&essential),
+        essential: rows3(&scaled),
         rotation: rows3(&pose.right_from_left),
         direction: pose.direction.into(),
         rotation_off_deg: turn.angle().to_degrees(),

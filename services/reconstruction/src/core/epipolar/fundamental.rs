@@ -9,7 +9,7 @@ pub(super) const POINTS_MIN: usize = 8;
 /// The least squares' second-smallest eigenvalue, as a share of the largest, below which a second F fits as well as the first.
 const GAP_MIN: f64 = 1e-11;
 
-/// F with p_rᵀ F p_l = 0 in the least-squares sense, of rank 2 and Frobenius norm 1. Eight or more points, in pixels or
+/// F with p_rᵀ F p_l = 0 in the least-squares sense, of rank 2, Frobenius norm 1 and, its sign being free, f₃₃ ≥ 0. Eight or more points, in pixels or
 /// normalised coordinates.
 ///
 /// # Errors
@@ -42,8 +42,8 @@ pub fn eight_point<'a>(pairs: impl IntoIterator<Item = &'a PointPair, IntoIter: 
     let f = Matrix3::from_row_slice(eigen.eigenvectors.column(order[0]).as_slice());
     // Rank 2 while the coordinates are still normalised: there the least change is the right one.
     let f = right_from.transpose() * with_rank_two(&f).ok_or(EpipolarError::Degenerate)? * left_from;
-    let norm = f.norm();
-    if norm.is_finite() && norm > 0.0 { Ok(f / norm) } else { Err(EpipolarError::Degenerate) }
+    let norm = if f.m33 < 0.0 { -f.norm() } else { f.norm() };
+    if norm.is_finite() && norm != 0.0 { Ok(f / norm) } else { Err(EpipolarError::Degenerate) }
 }
 
 /// Squared distance of a match from F, to first order (Sampson; Hartley and Zisserman 11.9); in the square of the points' unit.

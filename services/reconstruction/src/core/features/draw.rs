@@ -8,7 +8,7 @@ use opencv::{imgcodecs, imgproc};
 use super::{FeatureStudy, Keypoint};
 use crate::core::cv;
 
-/// Room for the words above each row, pixels.
+/// Room for the words above each row, pixels, for pictures 640 px wide; all of it grows with them.
 const TITLE_PX: i32 = 28;
 /// Between the left and the right picture, pixels.
 const GAP_PX: i32 = 8;
@@ -22,9 +22,11 @@ const LINES_MAX: usize = 250;
 /// OpenCV's, which only memory can cause.
 pub fn encode_png(left: &Image, right: &Image, study: &FeatureStudy) -> opencv::Result<Vec<u8>> {
     let (width, height) = (left.width_px().max(right.width_px()) as i32, left.height_px().max(right.height_px()) as i32);
-    let row_height = TITLE_PX + height;
+    let zoom = (width / 640).max(1);
+    let (title_px, gap_px) = (TITLE_PX * zoom, GAP_PX * zoom);
+    let row_height = title_px + height;
     let mut canvas =
-        Mat::new_rows_cols_with_default(2 * row_height, 2 * width + GAP_PX, CV_8UC3, Scalar::new(255.0, 255.0, 255.0, 0.0))?;
+        Mat::new_rows_cols_with_default(2 * row_height, 2 * width + gap_px, CV_8UC3, Scalar::new(255.0, 255.0, 255.0, 0.0))?;
     let counts = study.counts();
     let name = study.method.name().to_uppercase();
     let titles = [
@@ -33,18 +35,18 @@ pub fn encode_png(left: &Image, right: &Image, study: &FeatureStudy) -> opencv::
     ];
     for (row, title) in titles.iter().enumerate() {
         let top = row as i32 * row_height;
-        put_words(&mut canvas, title, top)?;
-        for (image, x) in [(left, 0), (right, width + GAP_PX)] {
-            paste(&mut canvas, image, x, top + TITLE_PX)?;
+        put_words(&mut canvas, title, top, zoom)?;
+        for (image, x) in [(left, 0), (right, width + gap_px)] {
+            paste(&mut canvas, image, x, top + title_px)?;
         }
         let place = |keypoint: &Keypoint, x: i32| {
-            Point::new(keypoint.x_px.round() as i32 + x, keypoint.y_px.round() as i32 + top + TITLE_PX)
+            Point::new(keypoint.x_px.round() as i32 + x, keypoint.y_px.round() as i32 + top + title_px)
         };
         if row == 0 {
             let yellow = Scalar::new(0.0, 215.0, 255.0, 0.0);
-            for (features, x) in [(&study.left, 0), (&study.right, width + GAP_PX)] {
+            for (features, x) in [(&study.left, 0), (&study.right, width + gap_px)] {
                 for keypoint in &features.keypoints {
-                    imgproc::circle(&mut canvas, place(keypoint, x), 2, yellow, 1, imgproc::LINE_AA, 0)?;
+                    imgproc::circle(&mut canvas, place(keypoint, x), 2 * zoom, yellow, zoom, imgproc::LINE_AA, 0)?;
                 }
             }
         }
@@ -55,10 +57,10 @@ pub fn encode_png(left: &Image, right: &Image, study: &FeatureStudy) -> opencv::
             let m = study.matches[index];
             let (from, to) = (&study.left.keypoints[m.left], &study.right.keypoints[m.right]);
             let colour = colour(from.y_px / height as f32);
-            let (from, to) = (place(from, 0), place(to, width + GAP_PX));
-            imgproc::line(&mut canvas, from, to, colour, 1, imgproc::LINE_AA, 0)?;
+            let (from, to) = (place(from, 0), place(to, width + gap_px));
+            imgproc::line(&mut canvas, from, to, colour, zoom, imgproc::LINE_AA, 0)?;
             for end in [from, to] {
-                imgproc::circle(&mut canvas, end, 3, colour, 1, imgproc::LINE_AA, 0)?;
+                imgproc::circle(&mut canvas, end, 3 * zoom, colour, zoom, imgproc::LINE_AA, 0)?;
             }
         }
     }
@@ -67,10 +69,20 @@ pub fn encode_png(left: &Image, right: &Image, study: &FeatureStudy) -> opencv::
     Ok(png.to_vec())
 }
 
-fn put_words(canvas: &mut Mat, text: &str, top: i32) -> opencv::Result<()> {
+fn put_words(canvas: &mut Mat, text: &str, top: i32, zoom: i32) -> opencv::Result<()> {
     let ink = Scalar::new(40.0, 40.0, 40.0, 0.0);
-    let at = Point::new(8, top + 19);
-    imgproc::put_text(canvas, text, at, imgproc::FONT_HERSHEY_SIMPLEX, 0.5, ink, 1, imgproc::LINE_AA, false)
+    let at = Point::new(8 * zoom, top + 19 * zoom);
+    imgproc::put_text(
+        canvas,
+        text,
+        at,
+        imgproc::FONT_HERSHEY_SIMPLEX,
+        0.5 * f64::from(zoom),
+        ink,
+        zoom,
+        imgproc::LINE_AA,
+        false,
+    )
 }
 
 fn paste(canvas: &mut Mat, image: &Image, x: i32, y: i32) -> opencv::Result<()> {

@@ -30,6 +30,9 @@ use super::epipolar::{
 const RANSAC_MATCHES_MAX: usize = 3000;
 /// A focal length known worse than this, as a share of itself, is not known.
 const FOCAL_SIGMA_MAX: f64 = 0.02;
+/// What lenses are off by all the same, pixels RMS: unlike the matches' scatter it does not average out. Where an error of this size,
+/// of the worst shape, would pass for another focal length, the pictures do not show it.
+const LENS_ERROR_PX: f64 = 0.05;
 /// Matches further off than this many standard deviations are not used for the final fit.
 const OUTLIER_SIGMAS: f64 = 4.0;
 /// The 99.9 % point of χ² with five degrees of freedom: beyond it a pose has changed, not scattered.
@@ -164,7 +167,7 @@ pub struct SelfCalibration {
     pub sigma_px: f64,
     /// Turn of the right camera against the calibration in force, about its own x (pitch), y (yaw) and z (roll), radians.
     pub turn_rad: Vector3<f64>,
-    /// Its standard deviations.
+    /// Its standard deviations, from the scatter of the matches: the lenses are taken as exact.
     pub turn_sigma_rad: Vector3<f64>,
     /// Turn of the baseline's direction against the calibration in force, in the right camera's axes: towards y, towards z, radians.
     pub direction_rad: Vector2<f64>,
@@ -455,10 +458,12 @@ impl Fit<'_> {
         }
         let sigma = |i: usize| best.covariance[(i, i)].max(0.0).sqrt();
         let focal_scale = self.settings.refine_focal.then(|| (best.pose.focal_scale, sigma(5)));
-        if let Some((_, sigma)) = focal_scale
-            && sigma > FOCAL_SIGMA_MAX
-        {
-            return Err(SelfCalibrateError::FocalOpen { sigma_percent: 100.0 * sigma });
+        if let Some((_, sigma)) = focal_scale {
+            let by_lens = LENS_ERROR_PX / best.sigma_px.max(0.01) * (best.used.len() as f64).sqrt() * sigma;
+            let sigma = sigma.hypot(by_lens);
+            if sigma > FOCAL_SIGMA_MAX {
+                return Err(SelfCalibrateError::FocalOpen { sigma_percent: 100.0 * sigma });
+            }
         }
         let (baseline_m, baseline_sigma_m) = match self.settings.scale {
             Scale::Given => (given.baseline_m(), 0.0),
