@@ -158,3 +158,36 @@ fn every_command_explains_itself_with_an_example() {
         assert!(output.status.success() && text.contains("Example: halcyon"), "{command:?}: {text}");
     }
 }
+
+#[test]
+fn features_and_self_calibration_work_on_the_samples() {
+    for command in ["features", "self-calibrate"] {
+        let output = halcyon(&[command, "--help"]);
+        let text = String::from_utf8_lossy(&output.stdout);
+        assert!(output.status.success() && text.contains("Example: halcyon"), "{command}: {text}");
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let (rig, png) = (folder.path().join("rig.yaml"), folder.path().join("m.png"));
+    let (rig, png) = (rig.to_str().expect("text"), png.to_str().expect("text"));
+    let board = [&BOARD[..], &["--out", rig, "--json"]].concat();
+    json(&halcyon(&calibrate("samples/left??.jpg", "samples/right??.jpg", &board)));
+    let pair = ["--left", "samples/left01.jpg", "--right", "samples/right01.jpg"];
+    let report =
+        json(&halcyon(&[&["features"][..], &pair, &["--method", "surf", "--rig", rig, "--out", png, "--json"]].concat()));
+    let row = &report["rows"][0];
+    assert!(row["left"].as_u64() > Some(300) && row["left_after"].as_u64() > Some(50), "{report:#}");
+    assert!(row["pose"]["rotation_off_deg"].as_f64().expect("a number") < 2.0, "{report:#}");
+    assert!(std::fs::read(png).expect("a picture").starts_with(b"\x89PNG"));
+    let all = ["--left", "samples/left0?.jpg", "--right", "samples/right0?.jpg"];
+    let report = json(&halcyon(&[&["self-calibrate", "--rig", rig, "--json"][..], &all].concat()));
+    assert_eq!((&report["has_drifted"], report["views"].as_array().map(Vec::len)), (&false.into(), Some(9)));
+    assert!(report["row_error_after_px"].as_f64().expect("a number") < 0.6, "{report:#}");
+
+    let same = ["--left", "samples/left01.jpg", "--right", "samples/left01.jpg"];
+    refused(&[&["self-calibrate", "--rig", rig][..], &same].concat(), "from one place");
+    refused(&[&["self-calibrate", "--rig", rig][..], &pair, &["--baseline", "nan"]].concat(), "baseline");
+    refused(&[&["self-calibrate", "--rig", "nowhere.yaml"][..], &pair].concat(), "nowhere.yaml");
+    refused(&[&["features"][..], &pair, &["--method", "harris"]].concat(), "harris");
+    refused(&[&["features"][..], &pair, &["--out", "m.jpg"]].concat(), ".png");
+    refused(&["features", "--left", "samples/left01.jpg", "--right", rig], "rig.yaml");
+}

@@ -1,18 +1,21 @@
-//! What `halcyon calibrate`, `halcyon match`, `halcyon reconstruct` and `halcyon rig` do, without the command line: files in,
+//! What `halcyon calibrate`, `features`, `match`, `reconstruct`, `rig` and `self-calibrate` do, without the command line: files in,
 //! files and a report out.
 
 mod calibrate;
 mod compare;
+mod features;
 mod matching;
 mod options;
 mod reconstruct;
 mod rig;
+mod self_calibrate;
 
 pub use calibrate::{
     CalibrateCliError, CalibrateReport, CalibrateRequest, CameraReport, CoverageReport, DepthReport, ErrorByViewsReport,
     ViewReport, calibrate, convert_rig,
 };
 pub use compare::{Matched, THESIS_SIZES_PX, TimeAtSize, compare, times_by_size};
+pub use features::{FeatureRow, FeaturesCliError, FeaturesOptions, FeaturesReport, PoseReport, features};
 pub use matching::{MatchCliError, MatchReport, TruthReport, match_pair};
 pub use options::{MatchOptions, OptionError};
 pub use reconstruct::{
@@ -20,5 +23,9 @@ pub use reconstruct::{
     SurveyReport, cloud_of, given_pose, reconstruct_pair, reconstruct_survey,
 };
 pub use rig::{BestRow, BudgetRow, RigCliError, RigNumbers, RigOptions, RigReport, RigSource, rig};
+pub use self_calibrate::{
+    AlternativeReport, AngleReport, SelfCalibrateCliError, SelfCalibrateOptions, SelfCalibrateReport, SelfViewReport,
+    self_calibrate,
+};
 
 pub use crate::core::rig_budget::DISPARITY_SIGMA_PX;

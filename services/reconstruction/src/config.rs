@@ -38,6 +38,9 @@ pub struct Config {
     pub seed: u64,
     /// Pictures for people are published at most this often, hertz, at most 2; 0 turns them off.
     pub preview_rate_hz: f64,
+    /// The calibration is checked against what the cameras see this often, seconds; 0 turns that off. Rows off by more than half a
+    /// pixel make the service call itself degraded.
+    pub drift_period_s: f64,
     /// Threads that OpenCV may use in this process. Its default, all, slows the other services of a small on-board computer.
     pub threads: u32,
 }
@@ -59,6 +62,7 @@ impl Default for Config {
             fixed_rig: settings.fixed_rig,
             seed: settings.seed,
             preview_rate_hz: 1.0,
+            drift_period_s: 10.0,
             threads: 1,
         }
     }
@@ -119,6 +123,7 @@ impl Config {
         within("cell_m", self.cell_m, 0.001, 100.0)?;
         within("points_min", self.points_min.into(), 16.0, 1e6)?;
         within("preview_rate_hz", self.preview_rate_hz, 0.0, 2.0)?;
+        within("drift_period_s", self.drift_period_s, 0.0, 3600.0)?;
         within("threads", self.threads.into(), 1.0, 256.0)
     }
 }
@@ -161,6 +166,8 @@ mod tests {
         check(&|c| c.cell_m = 0.0, "cell_m");
         check(&|c| c.points_min = 0, "points_min");
         check(&|c| c.preview_rate_hz = 2.5, "preview_rate_hz");
+        check(&|c| c.drift_period_s = -1.0, "drift_period_s");
+        check(&|c| c.drift_period_s = f64::NAN, "drift_period_s");
         check(&|c| c.threads = 0, "threads");
     }
 }

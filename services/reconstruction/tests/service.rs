@@ -52,3 +52,37 @@ async fn a_pair_becomes_a_patch_and_a_bad_one_does_no_harm() {
     stop.cancel();
     assert!(tokio::time::timeout(PATIENCE, service).await.unwrap().unwrap().is_ok());
 }
+
+/// A right camera that has pitched by half a degree: rows are off by 3 px, patches or not, and the fleet is told.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_calibration_that_has_drifted_is_told() {
+    let context = testing::context("reconstruction.test").await;
+    let rig = RigId::new("leader-1").unwrap();
+    let pairs = context.bus.publisher(&topics::pair(&rig)).await.unwrap();
+    let mut events = context.bus.subscribe(&topics::event()).await.unwrap();
+    let config = Config { drift_period_s: 1.0, ..Config::default() };
+    let service = tokio::spawn(halcyon_reconstruction::run(context.clone(), config));
+
+    let bent = halcyon_model::RigCalibration {
+        right_from_left: nalgebra::Rotation3::from_euler_angles(0.5_f64.to_radians(), 0.0, 0.0).into_inner(),
+        ..default_rig()
+    };
+    let seen = render(&bent, &pose(0.0, 0.0, 5.0, [0.0; 3]), &|_, _| 0.0, 2.0, 1);
+    let told = tokio::time::timeout(PATIENCE, async {
+        for step in 0_u64.. {
+            let stamp = seen.stamp + Duration::from_millis(400 * step);
+            pairs.put(&StereoPair { stamp, sequence: step, calibration: default_rig(), ..seen.clone() }).await.unwrap();
+            tokio::select! {
+                event = events.recv() => return event.unwrap(),
+                () = context.clock.sleep(Duration::from_millis(200)) => {}
+            }
+        }
+        unreachable!()
+    });
+    let event = told.await.unwrap();
+    assert_eq!(event.severity, halcyon_model::Severity::Warning);
+    assert!(event.what.contains("leader-1 has drifted") && event.why.contains("off by 3.0 ±"), "{event:?}");
+
+    context.stop.cancel();
+    assert!(tokio::time::timeout(PATIENCE, service).await.unwrap().unwrap().is_ok());
+}

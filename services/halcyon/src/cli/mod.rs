@@ -2,12 +2,14 @@
 
 mod calibrate;
 mod config;
+mod features;
 mod matching;
 mod mission;
 mod output;
 mod reconstruct;
 mod rig;
 mod run;
+mod self_calibrate;
 mod sim;
 mod up;
 
@@ -35,6 +37,10 @@ enum Command {
     Run(run::Args),
     /// Calibrate a stereo rig from pictures of a checkerboard
     Calibrate(calibrate::Args),
+    /// Find the pose of a rig's cameras from pairs without a board, and whether its calibration has drifted
+    SelfCalibrate(self_calibrate::Args),
+    /// Find and match features of a pair: counts before and after RANSAC, fundamental matrix, pose
+    Features(features::Args),
     /// Match a rectified pair of pictures to a disparity map
     Match(matching::Args),
     /// Measure the water surface in a raw pair of pictures, or in every pair of a survey folder
@@ -57,6 +63,8 @@ pub fn main() -> ExitCode {
         Command::Up(args) => up::run(&options, args),
         Command::Run(args) => run::run(&options, &args),
         Command::Calibrate(args) => calibrate::run(&args),
+        Command::SelfCalibrate(args) => self_calibrate::run(&args),
+        Command::Features(args) => features::run(&args),
         Command::Match(args) => matching::run(&args),
         Command::Reconstruct(args) => reconstruct::run(&args),
         Command::Rig(args) => rig::run(&args),

@@ -240,6 +240,12 @@ impl Reconstructor {
         self.rectifier.as_ref().map(|rectifier| rectifier.grey().0)
     }
 
+    /// The rectifier, which holds the last pair whose size fits its calibration, patch or no patch.
+    #[must_use]
+    pub fn rectifier(&self) -> Option<&Rectifier> {
+        self.rectifier.as_ref()
+    }
+
     /// The rectified cameras of the last pair.
     #[must_use]
     pub fn rectified_rig(&self) -> Option<&RectifiedRig> {
