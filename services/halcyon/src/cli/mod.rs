@@ -1,5 +1,6 @@
 //! The command line: flags in, one subcommand called, an exit code out.
 
+mod bench;
 mod calibrate;
 mod config;
 mod features;
@@ -47,6 +48,8 @@ enum Command {
     Reconstruct(reconstruct::Args),
     /// Say what a rig can measure, from which altitude: footprint, noise, smallest waves, best altitude
     Rig(rig::Args),
+    /// Judge accuracy against water that is known exactly, beside the thesis's figures
+    Bench(bench::Args),
     /// Create, watch and command missions of a running fleet
     Mission(mission::Args),
     /// Simulate: render water to a survey folder, or serve vehicles over MAVLink
@@ -68,6 +71,7 @@ pub fn main() -> ExitCode {
         Command::Match(args) => matching::run(&args),
         Command::Reconstruct(args) => reconstruct::run(&args),
         Command::Rig(args) => rig::run(&args),
+        Command::Bench(args) => bench::run(&args),
         Command::Mission(args) => mission::run(args),
         Command::Sim(args) => sim::run(&options, args),
         Command::Config(args) => config::run(&options, &args),

@@ -1,6 +1,6 @@
 //! Poses that are known, seen through points that are known, and everything that shows no pose.
 
-use nalgebra::{Rotation3, Vector2};
+use nalgebra::{Rotation3, UnitVector3, Vector2};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
