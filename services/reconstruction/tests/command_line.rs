@@ -11,7 +11,6 @@ mod support;
 
 use std::path::Path;
 
-use halcyon_model::Image;
 use halcyon_reconstruction::cli::{self, CalibrateCliError, CalibrateRequest, MatchCliError, MatchOptions};
 use halcyon_reconstruction::core::calibrate::{CalibrateError, Options};
 use halcyon_reconstruction::core::disparity::{Disparity, pfm};

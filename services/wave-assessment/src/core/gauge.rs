@@ -202,15 +202,15 @@ mod tests {
     #[test]
     fn holes_are_no_readings() {
         let mut gauges = Gauges::default();
-        assert!(gauges.read(&grid(0.0, |_, _| f32::NAN)).iter().all(Option::is_none));
+        assert!(gauges.read(&patch(&grid(0.0, |_, _| f32::NAN), 0.1, 0.0)).iter().all(Option::is_none));
         // Nothing in the northern half: the three gauges there see nothing, and none is made up.
-        let half = gauges.read(&grid(0.0, |n, _| if n > 1.25 { f32::NAN } else { 0.01 }));
+        let half = gauges.read(&patch(&grid(0.0, |n, _| if n > 1.25 { f32::NAN } else { 0.01 }), 0.1, 0.0));
         assert_eq!(half.iter().filter(|r| r.is_some()).count(), 6);
         // A hole just at the centre: after a while its gauge moves to the nearest water in sight.
         let hole = |n: f64, e: f64| if (n - 1.0).abs() < 0.15 && (e - 1.5).abs() < 0.15 { f32::NAN } else { 0.01 };
         for _ in 0..=MISSES_MAX + 1 {
-            gauges.read(&grid(0.0, hole));
+            gauges.read(&patch(&grid(0.0, hole), 0.1, 0.0));
         }
-        assert!(gauges.read(&grid(0.0, hole))[CENTRE].is_some());
+        assert!(gauges.read(&patch(&grid(0.0, hole), 0.1, 0.0))[CENTRE].is_some());
     }
 }

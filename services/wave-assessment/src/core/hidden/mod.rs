@@ -129,7 +129,8 @@ pub(crate) fn hidden(window: &Window, config: &Config, interval_s: f64) -> Hidde
         };
         let (waves, all) = splitter.split_level(&levels, shape.as_ref());
         let (Some(waves), Some(all)) = (run.back(waves), run.back(all)) else { continue };
-        let slopes = shape.as_ref().and_then(|shape| {
+        // A grid whose attitude nobody doubts is tilted as the water is.
+        let slopes = shape.as_ref().filter(|_| splitter.slope_noise > 0.0).and_then(|shape| {
             let [waves, all] = splitter.split_slopes(shape);
             let both = |[east, north]: [Vec<f64>; 2]| Some([run.back(east)?, run.back(north)?]);
             Some((both(waves)?, both(all)?))
