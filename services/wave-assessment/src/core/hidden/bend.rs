@@ -216,21 +216,26 @@ mod tests {
         assert_eq!(bend_of(&grid(0.0, |_, _| f64::NAN)), None);
     }
 
-    /// Against grids of real plane waves: the level that was taken out is found again from the bend.
+    /// Against grids of real plane waves from all around: the level that was taken out is found again from the bend, but for the share
+    /// that is said to be unexplained (directions differ) and half a per cent of it that the cells' steps make.
     #[test]
     fn the_level_of_a_wave_follows_from_its_bend() {
-        for (length_m, worst) in [(20.0, 0.02), (10.0, 0.05), (6.0, 0.08), (4.5, 0.2)] {
+        for length_m in [20.0, 10.0, 6.0, 4.5] {
             let k = std::f64::consts::TAU / length_m;
-            for direction in [0.0_f64, 0.5, 1.1, 1.5, 2.4] {
+            let (mut off, mut all, mut unexplained) = (0.0, 0.0, 0.0);
+            for step in 0..12 {
+                let direction = std::f64::consts::PI * (f64::from(step) + 0.3) / 12.0;
                 let wave = |x: f64, y: f64| (k * (x * direction.cos() + y * direction.sin()) + 0.3).cos();
                 let grid = grid(0.3, wave);
                 let seen: Vec<f32> = grid.elevation_m.iter().copied().filter(|z| z.is_finite()).collect();
                 let level = seen.iter().map(|z| f64::from(*z)).sum::<f64>() / seen.len() as f64;
                 let bend = bend_of(&grid).unwrap();
                 let response = Response::new(k, bend.sides_m);
-                let found = response.level_per_bend_m2 * bend.half_laplacian_per_m;
-                assert!((found - level).abs() < worst, "{length_m} m, {direction}: {found} for {level}");
+                off += (response.level_per_bend_m2 * bend.half_laplacian_per_m - level).powi(2);
+                all += level * level;
+                unexplained = response.unexplained;
             }
+            assert!(off / all < 1.3 * unexplained + 5e-3, "{length_m} m: {} of {unexplained}", off / all);
         }
     }
 
