@@ -6,6 +6,7 @@
 pub mod accuracy;
 pub mod cli;
 pub mod fleet;
+pub mod lab;
 pub mod report;
 pub mod simulator;
 pub mod witness;

@@ -10,6 +10,7 @@
 //! | [`welch`] | Welch's spectrum, H_m0, T_p, T_m01, T_m02, T_e |
 //! | [`height`] | Rayleigh heights, the expected highest wave |
 //! | [`confidence`] | confidence limits of variances |
+//! | [`outlier`] | readings that cannot be, replaced by their neighbour |
 //! | [`filter`], [`spline`] | splitting a record by frequency; uneven samples to even ones |
 //!
 //! Elevation is positive up, metres; densities are one-sided, m²/Hz.
@@ -22,6 +23,7 @@ pub mod crossing;
 pub mod dispersion;
 pub mod filter;
 pub mod height;
+pub mod outlier;
 pub mod record;
 mod special;
 pub mod spectrum;

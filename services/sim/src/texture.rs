@@ -98,6 +98,19 @@ impl Texture {
         Self::from_texels((0..side * side).map(at).collect(), side, texel_m)
     }
 
+    /// The same pattern with `contrast` times its contrast about its mean, 0 to 1: clear water shows little of anything.
+    #[must_use]
+    pub fn faded(mut self, contrast: f64) -> Self {
+        let contrast = if contrast.is_finite() { contrast.clamp(0.0, 1.0) as f32 } else { 0.0 };
+        // The coarser levels are means of the finest, so they have its mean.
+        let finest = self.levels.first().map_or(&[][..], |level| &level.texels);
+        let mean = (finest.iter().map(|texel| f64::from(*texel)).sum::<f64>() / finest.len().max(1) as f64) as f32;
+        for texel in self.levels.iter_mut().flat_map(|level| &mut level.texels) {
+            *texel = mean + contrast * (*texel - mean);
+        }
+        self
+    }
+
     fn from_texels(texels: Vec<f32>, side: usize, texel_m: f64) -> Self {
         let mut levels = vec![Level { texels, mask: side - 1, shift: side.trailing_zeros(), per_m: 1.0 / texel_m }];
         while let Some(finer) = levels.last()

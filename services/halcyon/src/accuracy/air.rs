@@ -1,6 +1,7 @@
 //! From the air (thesis chapter 7, tables 7-1 and 7-2): a hovering carrier with an ordinary autopilot's errors.
 
-use halcyon_model::{PoseAtExposure, SurfacePatch};
+use halcyon_model::{PoseAtExposure, StereoPair, SurfacePatch};
+use halcyon_ocean::Record;
 use halcyon_sim::rig::RigConfig;
 use halcyon_sim::sea::SeaConfig;
 use halcyon_wave_assessment::Config;
@@ -11,6 +12,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::scene::{Scene, SceneError, chain, measure, rig_id, start, thesis_rig};
+use super::tank::trace_of;
 use super::truth::h_mean_and_h_s_m;
 
 /// What an autopilot gets wrong.
@@ -104,11 +106,24 @@ pub struct AirErrors {
     pub rotated_h_s_m: f64,
 }
 
+/// What a flight brought home.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Flown {
+    /// Measured minus true.
+    pub errors: AirErrors,
+    /// The thesis's series: each pair's mean level by (7-1), metres, with its time in seconds (figure 7-7).
+    pub levels_thesis: Vec<(f64, f64)>,
+    /// Halcyon's: elevation with the autopilot's wander told from the waves (figure 7-8).
+    pub trace: Vec<(f64, f64)>,
+    /// The last pair and its patch (figure 7-6).
+    pub last: (StereoPair, SurfacePatch),
+}
+
 /// Flies and measures.
 ///
 /// # Errors
 /// [`SceneError`] where nothing comes out.
-pub fn fly(flight: &Flight) -> Result<AirErrors, SceneError> {
+pub fn fly(flight: &Flight) -> Result<Flown, SceneError> {
     let mut scene = Scene::new(&flight.rig, &flight.sea, flight.grain_m, flight.seed)?;
     let mut random = ChaCha8Rng::seed_from_u64(flight.seed ^ 0xa1);
     let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
@@ -116,7 +131,7 @@ pub fn fly(flight: &Flight) -> Result<AirErrors, SceneError> {
     let mut assessor = Assessor::new(config).map_err(|_| SceneError::NoResult("the rig's name is not valid"))?;
     let mut chain = chain(flight.cell_m, false);
     let mut patches: Vec<SurfacePatch> = Vec::new();
-    let mut last = None;
+    let (mut last, mut last_pair) = (None, None);
     let Autopilot { attitude_sigma_rad, height_sigma_m, drift_m } = flight.autopilot;
     for i in 0..(flight.duration_s * flight.rate_hz) as usize {
         let t_s = i as f64 / flight.rate_hz;
@@ -142,18 +157,24 @@ pub fn fly(flight: &Flight) -> Result<AirErrors, SceneError> {
         let patch = measure(&mut chain, &pair)?;
         last = assessor.observe(&patch, pair.stamp).ok().flatten().or(last);
         patches.push(patch);
+        last_pair = Some(pair);
     }
     let state = last.ok_or(SceneError::NoResult("no sea state came out"))?;
+    let trace = trace_of(&state);
+    let levels_thesis =
+        patches.iter().filter_map(|patch| Some((patch.stamp.seconds_since(start()), patch.level_thesis_m?))).collect();
     let (Some(h_mean_m), Some(h_s_m)) = (state.h_mean_m, state.h_s_m) else {
         return Err(SceneError::NoResult("the sea state has no wave heights"));
     };
     let (true_h_mean_m, true_h_s_m) = true_heights(&scene, flight);
-    // As the thesis did it: one number for each pair, the patch's mean level, and no more.
+    // As the thesis did it: one number for each pair, the patch's mean level, and no more. A straight line is taken out, which the
+    // thesis did not: about a mean alone a drift of centimetres crosses but once, and has no waves at all.
     let by_level = |level: fn(&SurfacePatch) -> Option<f64>| {
         let levels: Vec<f64> = patches.iter().filter_map(level).collect();
-        h_mean_and_h_s_m(&[levels]).1
+        let record = Record::new(levels, flight.rate_hz).map(Record::without_trend);
+        record.map_or(f64::NAN, |record| h_mean_and_h_s_m(&[record.samples_m().to_vec()]).1)
     };
-    Ok(AirErrors {
+    let errors = AirErrors {
         true_h_mean_m,
         true_h_s_m,
         h_mean_m: h_mean_m.value - true_h_mean_m,
@@ -161,7 +182,9 @@ pub fn fly(flight: &Flight) -> Result<AirErrors, SceneError> {
         h_s_held: (h_s_m.low..=h_s_m.high).contains(&true_h_s_m),
         thesis_h_s_m: by_level(|patch| patch.level_thesis_m) - true_h_s_m,
         rotated_h_s_m: by_level(|patch| patch.level_m) - true_h_s_m,
-    })
+    };
+    let last = last_pair.zip(patches.pop()).ok_or(SceneError::NoResult("the flight has no pair"))?;
+    Ok(Flown { errors, levels_thesis, trace, last })
 }
 
 /// H_m and H_s of the water at nine places under the cameras, sampled so densely that no crest is missed.

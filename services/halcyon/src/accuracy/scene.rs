@@ -72,7 +72,15 @@ impl Scene {
     /// # Errors
     /// [`SceneError`] for a rig or a sea that cannot be.
     pub fn new(rig: &RigConfig, sea: &SeaConfig, grain_m: f64, seed: u64) -> Result<Self, SceneError> {
-        let renderer = Renderer::new(rig, Arc::new(Texture::grained(seed, grain_m)))?;
+        Self::with_texture(rig, sea, Texture::grained(seed, grain_m), seed)
+    }
+
+    /// The same with a surface of your own.
+    ///
+    /// # Errors
+    /// As [`Scene::new`].
+    pub fn with_texture(rig: &RigConfig, sea: &SeaConfig, texture: Texture, seed: u64) -> Result<Self, SceneError> {
+        let renderer = Renderer::new(rig, Arc::new(texture))?;
         Ok(Self { renderer, water: Water::new(sea, seed)?, seed, sequence: 0 })
     }
 

@@ -57,44 +57,80 @@ pub struct TankErrors {
     pub r_squared: f64,
 }
 
-/// What came out of one run.
-pub(super) struct Assessed {
+/// A record of the water's height that came out of pairs, and its wave heights.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Assessed {
+    /// H_m, metres.
     pub h_mean_m: f64,
+    /// H_s, metres.
     pub h_s_m: f64,
-    pub state: SeaState,
+    /// Elevation, metres, with its time in seconds.
+    pub trace: Vec<(f64, f64)>,
 }
+
+/// One run of the tank: what was made, and what was measured.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TankRecord {
+    /// Frequency of the wave maker, hertz.
+    pub frequency_hz: f64,
+    /// Its height, crest to trough, metres.
+    pub height_m: f64,
+    /// By stereo.
+    pub stereo: Assessed,
+    /// Frequency and amplitude of the sine that explains most of it, hertz and metres.
+    pub peak: (f64, f64),
+    /// What a perfect probe under the cameras reads, metres, [`PROBE_HZ`] times a second.
+    pub probe_m: Vec<f64>,
+}
+
+/// Readings of the perfect probe a second.
+pub const PROBE_HZ: f64 = 50.0;
 
 /// Runs the tank.
 ///
 /// # Errors
 /// [`SceneError`] where nothing comes out.
-pub fn tank(run: &TankRun) -> Result<TankErrors, SceneError> {
-    let (mut h_mean_m, mut h_s_m, mut peak_hz, mut count) = (0.0, 0.0, 0.0_f64, 0.0);
-    let mut amplitudes = Vec::new();
+pub fn tank(run: &TankRun) -> Result<Vec<TankRecord>, SceneError> {
+    let mut records = Vec::new();
     for &frequency_hz in &run.frequencies_hz {
         for &height_m in &run.heights_m {
+            // The simulator rounds the frequency to a 2⁻²⁴th of a hertz, the height not at all.
             let sea = SeaConfig { depth_m: DEPTH_M, ..SeaConfig::regular(height_m, 1.0 / frequency_hz, 270.0) };
             let mut scene = Scene::new(&thesis_rig(0.092, run.scale), &sea, 0.0035 / run.scale, 21)?;
-            let measured = assess(&mut scene, run.pairs)?;
-            let (found_hz, amplitude_m) = peak(&measured.state);
-            // The wave maker's frequency is rounded by the simulator to a 2⁻²⁴th of a hertz, its height not at all.
-            h_mean_m += (measured.h_mean_m - height_m).abs();
-            h_s_m += (measured.h_s_m - height_m).abs();
-            peak_hz = peak_hz.max((found_hz - frequency_hz).abs());
-            amplitudes.push((0.5 * height_m, amplitude_m));
-            count += 1.0;
+            let stereo = assess(&mut scene, HEIGHT_M, run.pairs)?;
+            let readings = (run.pairs as f64 / RATE_HZ * PROBE_HZ) as usize;
+            let probe = |i: usize| scene.water.elevation_m(0.0, 0.0, start().plus_secs_f64(i as f64 / PROBE_HZ));
+            let probe_m = (0..readings).map(probe).collect();
+            records.push(TankRecord { frequency_hz, height_m, peak: peak(&stereo.trace), stereo, probe_m });
         }
     }
-    let mean = amplitudes.iter().map(|(truth, _)| truth).sum::<f64>() / count;
-    let spread: f64 = amplitudes.iter().map(|(truth, _)| (truth - mean).powi(2)).sum();
-    let residual: f64 = amplitudes.iter().map(|(truth, found)| (truth - found).powi(2)).sum();
-    // With one height there is no spread to explain; then against the amplitudes themselves.
-    let total = if spread > 0.0 { spread } else { amplitudes.iter().map(|(truth, _)| truth * truth).sum() };
-    Ok(TankErrors { h_mean_m: h_mean_m / count, h_s_m: h_s_m / count, peak_hz, r_squared: 1.0 - residual / total })
+    Ok(records)
 }
 
-/// `pairs` pairs of a rig on a tripod, not quite level, through chain and assessment.
-pub(super) fn assess(scene: &mut Scene, pairs: usize) -> Result<Assessed, SceneError> {
+impl TankErrors {
+    /// Of several runs together.
+    #[must_use]
+    pub fn of(records: &[TankRecord]) -> Self {
+        let count = records.len().max(1) as f64;
+        let mean = |error: &dyn Fn(&TankRecord) -> f64| records.iter().map(error).sum::<f64>() / count;
+        let peak_hz = records.iter().map(|record| (record.peak.0 - record.frequency_hz).abs()).fold(0.0, f64::max);
+        let truth = |record: &TankRecord| 0.5 * record.height_m;
+        let middle = mean(&truth);
+        let spread = mean(&|record| (truth(record) - middle).powi(2));
+        let residual = mean(&|record| (truth(record) - record.peak.1).powi(2));
+        // With one height there is no spread to explain; then against the amplitudes themselves.
+        let total = if spread > 0.0 { spread } else { mean(&|record| truth(record).powi(2)) };
+        Self {
+            h_mean_m: mean(&|record| (record.stereo.h_mean_m - record.height_m).abs()),
+            h_s_m: mean(&|record| (record.stereo.h_s_m - record.height_m).abs()),
+            peak_hz,
+            r_squared: 1.0 - residual / total,
+        }
+    }
+}
+
+/// `pairs` pairs of a rig on a tripod, `height_m` above the water and not quite level, through chain and assessment.
+pub(super) fn assess(scene: &mut Scene, height_m: f64, pairs: usize) -> Result<Assessed, SceneError> {
     let config = Config { fixed_rig: true, window_s: 3600.0, ..Config::default() };
     let mut assessor = Assessor::new(config).map_err(|_| SceneError::NoResult("the rig's name is not valid"))?;
     let mut chain = chain(0.04, true);
@@ -102,26 +138,29 @@ pub(super) fn assess(scene: &mut Scene, pairs: usize) -> Result<Assessed, SceneE
     let mut last = None;
     for i in 0..pairs {
         let t_s = i as f64 / RATE_HZ;
-        let pair = scene.pair(t_s, Vector3::new(0.0, 0.0, -HEIGHT_M), &leaning, None)?;
+        let pair = scene.pair(t_s, Vector3::new(0.0, 0.0, -height_m), &leaning, None)?;
         let patch = measure(&mut chain, &pair)?;
         last = assessor.observe(&patch, start().plus_secs_f64(t_s)).ok().flatten().or(last);
     }
     let state = last.ok_or(SceneError::NoResult("no sea state came out"))?;
     match (state.h_mean_m, state.h_s_m) {
-        (Some(h_mean_m), Some(h_s_m)) => Ok(Assessed { h_mean_m: h_mean_m.value, h_s_m: h_s_m.value, state }),
+        (Some(h_mean_m), Some(h_s_m)) => Ok(Assessed { h_mean_m: h_mean_m.value, h_s_m: h_s_m.value, trace: trace_of(&state) }),
         _ => Err(SceneError::NoResult("the sea state has no wave heights")),
     }
 }
 
-/// Frequency and amplitude of the sine that explains most of the trace: least squares at each of a fine row of frequencies, so
-/// that neither the record's length nor its rate rounds the answer.
-pub(super) fn peak(state: &SeaState) -> (f64, f64) {
-    let samples: Vec<(f64, f64)> =
-        state.trace.iter().map(|point| (point.stamp.seconds_since(start()), point.elevation_m)).collect();
+/// A sea state's record: seconds after the first pair, and metres.
+pub(super) fn trace_of(state: &SeaState) -> Vec<(f64, f64)> {
+    state.trace.iter().map(|point| (point.stamp.seconds_since(start()), point.elevation_m)).collect()
+}
+
+/// Frequency and amplitude of the sine that explains most of a record (seconds, metres): least squares at each of a fine row of
+/// frequencies, so that neither the record's length nor its rate rounds the answer.
+fn peak(samples: &[(f64, f64)]) -> (f64, f64) {
     let amplitude_m = |frequency_hz: f64| {
         let mut normal = nalgebra::Matrix3::zeros();
         let mut right = Vector3::zeros();
-        for (t_s, elevation_m) in &samples {
+        for (t_s, elevation_m) in samples {
             let (sin, cos) = (TAU * frequency_hz * t_s).sin_cos();
             let row = Vector3::new(sin, cos, 1.0);
             normal += row * row.transpose();

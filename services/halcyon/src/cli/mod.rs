@@ -4,6 +4,7 @@ mod bench;
 mod calibrate;
 mod config;
 mod features;
+mod lab;
 mod matching;
 mod mission;
 mod output;
@@ -50,6 +51,8 @@ enum Command {
     Rig(rig::Args),
     /// Judge accuracy against water that is known exactly, beside the thesis's figures
     Bench(bench::Args),
+    /// Make the thesis's tables and figures again, its values beside ours
+    Lab(lab::Args),
     /// Create, watch and command missions of a running fleet
     Mission(mission::Args),
     /// Simulate: render water to a survey folder, or serve vehicles over MAVLink
@@ -72,6 +75,7 @@ pub fn main() -> ExitCode {
         Command::Reconstruct(args) => reconstruct::run(&args),
         Command::Rig(args) => rig::run(&args),
         Command::Bench(args) => bench::run(&args),
+        Command::Lab(args) => lab::run(&args),
         Command::Mission(args) => mission::run(args),
         Command::Sim(args) => sim::run(&options, args),
         Command::Config(args) => config::run(&options, &args),

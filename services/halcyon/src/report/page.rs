@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use base64::prelude::{BASE64_STANDARD, Engine as _};
+
 /// A page that grows from top to bottom. Text is escaped; figures are taken as they are.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Page {
@@ -55,6 +57,17 @@ impl Page {
     /// An SVG element with what it shows.
     pub fn figure(&mut self, svg: &str, caption: &str) -> &mut Self {
         let _ = writeln!(self.body, "<figure>{svg}<figcaption>{}</figcaption></figure>", escaped(caption));
+        self
+    }
+
+    /// A picture (PNG) with what it shows; it travels inside the page.
+    pub fn picture(&mut self, png: &[u8], caption: &str) -> &mut Self {
+        let data = BASE64_STANDARD.encode(png);
+        let caption = escaped(caption);
+        let _ = writeln!(
+            self.body,
+            "<figure><img alt=\"{caption}\" src=\"data:image/png;base64,{data}\"><figcaption>{caption}</figcaption></figure>"
+        );
         self
     }
 

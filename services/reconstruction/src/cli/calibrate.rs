@@ -5,7 +5,7 @@ use std::path::Path;
 use halcyon_model::{Image, RigCalibration};
 
 use crate::core::calibrate::{BoardSpec, CalibrateError, Calibration, Options, calibrate_with, camera_infos};
-use crate::files::{FileError, GlobError, RigFileError, glob, read_picture, read_rig, write_rig, write_ros};
+use crate::files::{FileError, GlobError, RigFileError, glob, read_pair, read_rig, write_rig, write_ros};
 
 mod report;
 
@@ -74,11 +74,8 @@ pub fn calibrate(
     if left.len() != right.len() {
         return Err(CalibrateCliError::Unpaired { left: left.len(), right: right.len() });
     }
-    let views: Vec<(Image, Image)> = left
-        .iter()
-        .zip(&right)
-        .map(|(left, right)| Ok((read_picture(left)?, read_picture(right)?)))
-        .collect::<Result<_, FileError>>()?;
+    let views: Vec<(Image, Image)> =
+        left.iter().zip(&right).map(|(left, right)| read_pair(left, right)).collect::<Result<_, FileError>>()?;
     let calibration = calibrate_with(&views, board, &request.options, progress)?;
     write(&calibration.rig, request.out, request.ros)?;
     Ok((CalibrateReport::new(&calibration, &left, &right), calibration))

@@ -1,10 +1,11 @@
 //! The few bridges between our types and OpenCV's.
 
-use halcyon_model::{CameraIntrinsics, Image};
+use halcyon_model::{CameraIntrinsics, Image, RigCalibration};
 use nalgebra::{Matrix3, Vector3};
 use opencv::Result;
 use opencv::boxed_ref::BoxedRef;
-use opencv::core::{Mat, MatTraitConst, MatTraitConstManual};
+use opencv::calib3d;
+use opencv::core::{Mat, MatTraitConst, MatTraitConstManual, Rect, Size};
 
 /// A picture as OpenCV sees it; borrows the pixels.
 pub(crate) fn mat_from_image(image: &Image) -> Result<BoxedRef<'_, Mat>> {
@@ -50,4 +51,55 @@ pub(crate) fn intrinsics_from_mats(matrix: &Mat, distortion: &Mat) -> Result<Cam
 /// Width and height of a matrix, pixels.
 pub(crate) fn size_px(mat: &Mat) -> (u32, u32) {
     (mat.cols() as u32, mat.rows() as u32)
+}
+
+/// How a rig's pictures are turned and projected to be rectified.
+pub(crate) struct Rectification {
+    /// Rotation of the left camera into the rectified frame, 3 × 3.
+    pub(crate) left_rotation: Mat,
+    /// Rotation of the right camera.
+    pub(crate) right_rotation: Mat,
+    /// Projection of the rectified left camera, 3 × 4, pixels.
+    pub(crate) left_projection: Mat,
+    /// Projection of the right one.
+    pub(crate) right_projection: Mat,
+}
+
+/// Which pixels rectified pictures show.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum View {
+    /// As large as the focal lengths make them, edges that a camera did not see included.
+    Natural,
+    /// Zoomed until every pixel was seen by its camera.
+    OnlySeen,
+}
+
+/// Bouguet's rectification, by OpenCV.
+pub(crate) fn rectification(rig: &RigCalibration, view: View) -> Result<Rectification> {
+    let [mut left_rotation, mut right_rotation, mut left_projection, mut right_projection, mut q] =
+        [(); 5].map(|()| Mat::default());
+    let size = Size::new(rig.width_px as i32, rig.height_px as i32);
+    calib3d::stereo_rectify(
+        &mat_from_matrix3(&rig.left.matrix())?,
+        &mat_from_distortion(&rig.left)?,
+        &mat_from_matrix3(&rig.right.matrix())?,
+        &mat_from_distortion(&rig.right)?,
+        size,
+        &mat_from_matrix3(&rig.right_from_left)?,
+        &mat_from_vector3(&rig.right_from_left_m)?,
+        &mut left_rotation,
+        &mut right_rotation,
+        &mut left_projection,
+        &mut right_projection,
+        &mut q,
+        calib3d::CALIB_ZERO_DISPARITY,
+        match view {
+            View::Natural => -1.0,
+            View::OnlySeen => 0.0,
+        },
+        size,
+        None::<&mut Rect>,
+        None::<&mut Rect>,
+    )?;
+    Ok(Rectification { left_rotation, right_rotation, left_projection, right_projection })
 }

@@ -18,5 +18,6 @@ mod resample;
 pub mod rig_budget;
 mod scatter;
 pub mod self_calibrate;
+pub mod show;
 pub mod study;
 pub mod tilt;

@@ -4,7 +4,7 @@
 use halcyon_model::{Image, RigCalibration};
 use nalgebra::{Matrix3, Vector3};
 use opencv::calib3d;
-use opencv::core::{CV_8U, CV_32F, CV_32FC1, Mat, MatTraitConst, MatTraitConstManual, MatTraitManual, Rect, Scalar, Size};
+use opencv::core::{CV_8U, CV_32F, CV_32FC1, Mat, MatTraitConst, MatTraitConstManual, MatTraitManual, Scalar, Size};
 
 use super::camera;
 use super::cv;
@@ -140,39 +140,20 @@ impl Rectifier {
         let (right_matrix, right_distortion) =
             (cv::mat_from_matrix3(&calibration.right.matrix())?, cv::mat_from_distortion(&calibration.right)?);
         let size = Size::new(calibration.width_px as i32, calibration.height_px as i32);
-        let (mut r1, mut r2, mut p1, mut p2, mut q) =
-            (Mat::default(), Mat::default(), Mat::default(), Mat::default(), Mat::default());
-        calib3d::stereo_rectify(
-            &left_matrix,
-            &left_distortion,
-            &right_matrix,
-            &right_distortion,
-            size,
-            &cv::mat_from_matrix3(&calibration.right_from_left)?,
-            &cv::mat_from_vector3(&calibration.right_from_left_m)?,
-            &mut r1,
-            &mut r2,
-            &mut p1,
-            &mut p2,
-            &mut q,
-            calib3d::CALIB_ZERO_DISPARITY,
-            -1.0,
-            size,
-            None::<&mut Rect>,
-            None::<&mut Rect>,
-        )?;
-        let (projection, right_projection) = (p1.data_typed::<f64>()?.to_vec(), p2.data_typed::<f64>()?.to_vec());
+        let cv::Rectification { left_rotation, right_rotation, left_projection, right_projection } =
+            cv::rectification(calibration, cv::View::Natural)?;
+        let (left, right) = (left_projection.data_typed::<f64>()?, right_projection.data_typed::<f64>()?);
         let rig = RectifiedRig {
             width_px: calibration.width_px,
             height_px: calibration.height_px,
-            focal_px: projection[0],
-            cx_px: projection[2],
-            cy_px: projection[6],
-            baseline_m: -right_projection[3] / right_projection[0],
-            camera_from_rectified: cv::matrix3_from_mat(&r1)?.transpose(),
+            focal_px: left[0],
+            cx_px: left[2],
+            cy_px: left[6],
+            baseline_m: -right[3] / right[0],
+            camera_from_rectified: cv::matrix3_from_mat(&left_rotation)?.transpose(),
         };
-        let left = Side::new(&maps(&left_matrix, &left_distortion, &r1, &p1, size)?, size)?;
-        let right = Side::new(&maps(&right_matrix, &right_distortion, &r2, &p2, size)?, size)?;
+        let left = Side::new(&maps(&left_matrix, &left_distortion, &left_rotation, &left_projection, size)?, size)?;
+        let right = Side::new(&maps(&right_matrix, &right_distortion, &right_rotation, &right_projection, size)?, size)?;
         Ok(Self { calibration: *calibration, rig, weights: Weights::new(), margined: Margined::default(), left, right })
     }
 

@@ -3,8 +3,8 @@
 use halcyon_model::camera_info::CameraInfo;
 use halcyon_model::{CameraIntrinsics, RigCalibration};
 use nalgebra::{Matrix3, Matrix3x4, Vector2};
-use opencv::core::{Mat, MatTraitConstManual, Rect, Size};
-use opencv::{Result, calib3d};
+use opencv::Result;
+use opencv::core::{Mat, MatTraitConstManual};
 
 use super::CalibrateError;
 use super::sighting::{Side, Sighting};
@@ -24,28 +24,7 @@ pub struct RowError {
 /// # Errors
 /// [`CalibrateError::OpenCv`] where OpenCV refuses the rig.
 pub fn camera_infos(rig: &RigCalibration) -> std::result::Result<[CameraInfo; 2], CalibrateError> {
-    let (mut r1, mut r2, mut p1, mut p2, mut q) =
-        (Mat::default(), Mat::default(), Mat::default(), Mat::default(), Mat::default());
-    let size = Size::new(rig.width_px as i32, rig.height_px as i32);
-    calib3d::stereo_rectify(
-        &cv::mat_from_matrix3(&rig.left.matrix())?,
-        &cv::mat_from_distortion(&rig.left)?,
-        &cv::mat_from_matrix3(&rig.right.matrix())?,
-        &cv::mat_from_distortion(&rig.right)?,
-        size,
-        &cv::mat_from_matrix3(&rig.right_from_left)?,
-        &cv::mat_from_vector3(&rig.right_from_left_m)?,
-        &mut r1,
-        &mut r2,
-        &mut p1,
-        &mut p2,
-        &mut q,
-        calib3d::CALIB_ZERO_DISPARITY,
-        0.0,
-        size,
-        None::<&mut Rect>,
-        None::<&mut Rect>,
-    )?;
+    let found = cv::rectification(rig, cv::View::OnlySeen)?;
     let info = |intrinsics: CameraIntrinsics, rotation: &Mat, projection: &Mat| -> Result<CameraInfo> {
         Ok(CameraInfo {
             width_px: rig.width_px,
@@ -55,7 +34,10 @@ pub fn camera_infos(rig: &RigCalibration) -> std::result::Result<[CameraInfo; 2]
             projection: Matrix3x4::from_row_slice(projection.data_typed::<f64>()?),
         })
     };
-    Ok([info(rig.left, &r1, &p1)?, info(rig.right, &r2, &p2)?])
+    Ok([
+        info(rig.left, &found.left_rotation, &found.left_projection)?,
+        info(rig.right, &found.right_rotation, &found.right_projection)?,
+    ])
 }
 
 /// Distance across rows between the same corner left and right after rectification. NaN where no corner was seen on both sides.

@@ -56,7 +56,7 @@ pub fn encode_png(left: &Image, right: &Image, study: &FeatureStudy) -> opencv::
         for index in shown.into_iter().step_by(every) {
             let m = study.matches[index];
             let (from, to) = (&study.left.keypoints[m.left], &study.right.keypoints[m.right]);
-            let colour = colour(from.y_px / height as f32);
+            let colour = line_colour(from.y_px / height as f32);
             let (from, to) = (place(from, 0), place(to, width + gap_px));
             imgproc::line(&mut canvas, from, to, colour, zoom, imgproc::LINE_AA, 0)?;
             for end in [from, to] {
@@ -94,7 +94,7 @@ fn paste(canvas: &mut Mat, image: &Image, x: i32, y: i32) -> opencv::Result<()> 
 }
 
 /// Blue over green and orange to red as `share` goes from 0 to 1.
-fn colour(share: f32) -> Scalar {
+pub(crate) fn line_colour(share: f32) -> Scalar {
     let ramp = [[230.0, 110.0, 30.0], [170.0, 190.0, 20.0], [40.0, 200.0, 90.0], [0.0, 170.0, 250.0], [60.0, 50.0, 235.0]];
     let at = share.clamp(0.0, 1.0) * (ramp.len() - 1) as f32;
     let low = (at as usize).min(ramp.len() - 2);

@@ -12,6 +12,7 @@ pub mod surf;
 use std::str::FromStr;
 
 pub use draw::encode_png;
+pub(crate) use draw::line_colour;
 use halcyon_model::Image;
 pub use matching::{FeatureMatch, MatchRule, match_features};
 use opencv::core::{Mat, MatTraitConstManual};

@@ -2,8 +2,7 @@
 
 use halcyon_model::RigCalibration;
 use nalgebra::Matrix3;
-use opencv::calib3d;
-use opencv::core::{Mat, MatTraitConstManual, Rect, Size};
+use opencv::core::MatTraitConstManual;
 
 use crate::core::cv;
 use crate::core::epipolar::PointPair;
@@ -39,33 +38,12 @@ pub(super) struct RowGeometry {
 
 impl RowGeometry {
     pub(super) fn new(rig: &RigCalibration) -> opencv::Result<Self> {
-        let (mut r1, mut r2, mut p1, mut p2, mut q) =
-            (Mat::default(), Mat::default(), Mat::default(), Mat::default(), Mat::default());
-        let size = Size::new(rig.width_px as i32, rig.height_px as i32);
-        calib3d::stereo_rectify(
-            &cv::mat_from_matrix3(&rig.left.matrix())?,
-            &cv::mat_from_distortion(&rig.left)?,
-            &cv::mat_from_matrix3(&rig.right.matrix())?,
-            &cv::mat_from_distortion(&rig.right)?,
-            size,
-            &cv::mat_from_matrix3(&rig.right_from_left)?,
-            &cv::mat_from_vector3(&rig.right_from_left_m)?,
-            &mut r1,
-            &mut r2,
-            &mut p1,
-            &mut p2,
-            &mut q,
-            calib3d::CALIB_ZERO_DISPARITY,
-            -1.0,
-            size,
-            None::<&mut Rect>,
-            None::<&mut Rect>,
-        )?;
+        let found = cv::rectification(rig, cv::View::Natural)?;
         let t = &rig.right_from_left_m;
         Ok(Self {
-            left: cv::matrix3_from_mat(&r1)?,
-            right: cv::matrix3_from_mat(&r2)?,
-            focal_px: p1.data_typed::<f64>()?[0],
+            left: cv::matrix3_from_mat(&found.left_rotation)?,
+            right: cv::matrix3_from_mat(&found.right_rotation)?,
+            focal_px: found.left_projection.data_typed::<f64>()?[0],
             along_rows: t.x.abs() >= t.y.abs(),
         })
     }
