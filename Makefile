@@ -1,7 +1,7 @@
 # One verb a line. Everything that a bare Debian 12 with Rust and Node.js lacks is installed by `make setup`, which the others call.
 
 .DEFAULT_GOAL := help
-.PHONY: help run test lint format setup web samples docker clean
+.PHONY: help run test lint lab format setup web samples docker clean
 
 APT := libopencv-core-dev libopencv-calib3d-dev libopencv-imgcodecs-dev libopencv-imgproc-dev libopencv-features2d-dev \
        libopencv-videoio-dev libopencv-flann-dev clang libclang-dev libnetcdf-dev libsqlite3-dev pkg-config
@@ -18,6 +18,9 @@ run: build ## build, and fly the simulated fleet: dashboard at http://127.0.0.1:
 test: build setup-test samples ## every test, browser tests in headless Chromium included
 	cargo test --workspace --no-fail-fast
 	cd web && npm run --silent check && npm test --silent
+
+lab: build samples ## the thesis's tables and figures, its values beside ours: lab/index.html
+	target/debug/halcyon lab --out lab
 
 lint: setup ## formatting, clippy and types
 	cargo fmt --all --check

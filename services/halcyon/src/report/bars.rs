@@ -2,7 +2,7 @@
 
 use plotters::prelude::*;
 
-use super::{ChartError, HEIGHT_PX, WIDTH_PX, scale};
+use super::{ChartError, HEIGHT_PX, WIDTH_PX, frame, scale};
 
 /// Bars in groups: such as left and right for each view.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,8 +33,7 @@ impl Bars {
         let values = self.series.iter().flat_map(|(_, values)| values.iter().copied());
         let mut y = scale::range(values, true).ok_or(ChartError::Empty)?;
         if self.series.len() > 1 {
-            // Room for the names above the highest bar.
-            y.1 += 0.08 * self.series.len() as f64 * (y.1 - y.0);
+            y = frame::with_room_for_names(y, self.series.len());
         }
         let groups = self.groups.len().max(1);
         let mut svg = String::new();
@@ -48,19 +47,15 @@ impl Bars {
             let is_group = (at - index).abs() < 1e-6 && index >= 0.0;
             if is_group { self.groups.get(index as usize).cloned().unwrap_or_default() } else { String::new() }
         };
-        chart
-            .configure_mesh()
-            .disable_x_mesh()
+        let (x_text, y_text) = (name_of, |y: &f64| scale::label(*y));
+        let mut mesh = chart.configure_mesh();
+        frame::style(&mut mesh);
+        mesh.disable_x_mesh()
             .x_labels(groups.min(40))
-            .x_label_formatter(&name_of)
+            .x_label_formatter(&x_text)
             .y_desc(&self.y_label)
-            .y_label_formatter(&|y| scale::label(*y))
-            .light_line_style(TRANSPARENT)
-            .bold_line_style(BLACK.mix(0.12))
-            .axis_desc_style(("sans-serif", 15))
-            .label_style(("sans-serif", 13))
-            .draw()
-            .map_err(ChartError::draw)?;
+            .y_label_formatter(&y_text);
+        mesh.draw().map_err(ChartError::draw)?;
         // Four fifths of a group's width are bars.
         let width = 0.8 / self.series.len().max(1) as f64;
         for (index, (name, values)) in self.series.iter().enumerate() {
@@ -73,14 +68,7 @@ impl Bars {
             drawn.label(name).legend(move |(x, y)| Rectangle::new([(x + 4, y - 5), (x + 16, y + 5)], colour.filled()));
         }
         if self.series.len() > 1 {
-            chart
-                .configure_series_labels()
-                .position(SeriesLabelPosition::UpperRight)
-                .background_style(WHITE.mix(0.85))
-                .border_style(BLACK.mix(0.2))
-                .label_font(("sans-serif", 13))
-                .draw()
-                .map_err(ChartError::draw)?;
+            frame::names(&mut chart, SeriesLabelPosition::UpperRight)?;
         }
         area.present().map_err(ChartError::draw)?;
         drop(chart);

@@ -2,7 +2,7 @@
 
 use plotters::prelude::*;
 
-use super::{ChartError, HEIGHT_PX, WIDTH_PX, scale};
+use super::{ChartError, HEIGHT_PX, WIDTH_PX, frame, scale};
 
 /// How a series is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -109,6 +109,10 @@ impl Chart {
         let all = || self.series.iter().flat_map(|series| series.points.iter().map(|p| place(*p))).filter(|p| is_shown(*p));
         let mut x = scale::range(all().map(|point| point.0), false).ok_or(ChartError::Empty)?;
         let mut y = scale::range(all().map(|point| point.1), self.from_zero && !self.log_y).ok_or(ChartError::Empty)?;
+        let names = self.series.iter().filter(|series| !series.name.is_empty()).count();
+        if names > 1 && !self.low_legend && !self.equal_scales {
+            y = frame::with_room_for_names(y, names);
+        }
         let mut height_px = HEIGHT_PX;
         if self.equal_scales {
             // Square but for the axis labels.
@@ -126,18 +130,11 @@ impl Chart {
         // On a logarithmic axis two digits tell all, and four would run into the axis's name.
         let two_digits = |value: f64| format!("{value:.1e}").parse().unwrap_or(value);
         let y_text = |y: &f64| scale::label(if self.log_y { two_digits(10_f64.powf(*y)) } else { *y });
-        chart
-            .configure_mesh()
-            .x_desc(&self.x_label)
-            .y_desc(&self.y_label)
-            .x_label_formatter(&|x| scale::label(*x))
-            .y_label_formatter(&y_text)
-            .light_line_style(TRANSPARENT)
-            .bold_line_style(BLACK.mix(0.12))
-            .axis_desc_style(("sans-serif", 15))
-            .label_style(("sans-serif", 13))
-            .draw()
-            .map_err(ChartError::draw)?;
+        let x_text = |x: &f64| scale::label(*x);
+        let mut mesh = chart.configure_mesh();
+        frame::style(&mut mesh);
+        mesh.x_desc(&self.x_label).y_desc(&self.y_label).x_label_formatter(&x_text).y_label_formatter(&y_text);
+        mesh.draw().map_err(ChartError::draw)?;
         for (index, series) in self.series.iter().enumerate() {
             let colour = scale::colour(index);
             let points: Vec<(f64, f64)> = series.points.iter().map(|point| place(*point)).collect();
@@ -146,7 +143,9 @@ impl Chart {
                 Style::Points => {
                     let dots = points.into_iter().filter(|p| is_shown(*p)).map(|p| Circle::new(p, 3, colour.mix(0.8).filled()));
                     let drawn = chart.draw_series(dots).map_err(ChartError::draw)?;
-                    drawn.label(name).legend(move |(x, y)| Circle::new((x + 10, y), 3, colour.filled()));
+                    if !name.is_empty() {
+                        drawn.label(name).legend(move |(x, y)| Circle::new((x + 10, y), 3, colour.filled()));
+                    }
                 }
                 Style::Line | Style::Dashed => {
                     for (part, run) in points.split(|point| !is_shown(*point)).enumerate() {
@@ -159,22 +158,16 @@ impl Chart {
                         };
                         let drawn = drawn.map_err(ChartError::draw)?;
                         // One name, however often the line is broken.
-                        if part == 0 {
+                        if part == 0 && !name.is_empty() {
                             drawn.label(name).legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 20, y)], stroke));
                         }
                     }
                 }
             }
         }
-        if self.series.iter().any(|series| !series.name.is_empty()) {
-            chart
-                .configure_series_labels()
-                .position(if self.low_legend { SeriesLabelPosition::LowerRight } else { SeriesLabelPosition::UpperRight })
-                .background_style(WHITE.mix(0.85))
-                .border_style(BLACK.mix(0.2))
-                .label_font(("sans-serif", 13))
-                .draw()
-                .map_err(ChartError::draw)?;
+        if names > 0 {
+            let position = if self.low_legend { SeriesLabelPosition::LowerRight } else { SeriesLabelPosition::UpperRight };
+            frame::names(&mut chart, position)?;
         }
         area.present().map_err(ChartError::draw)?;
         drop(chart);

@@ -13,6 +13,7 @@
 
 mod bars;
 mod chart;
+mod frame;
 mod heat;
 mod page;
 mod scale;
