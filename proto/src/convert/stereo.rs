@@ -20,7 +20,7 @@ fn camera_to(camera: &CameraIntrinsics) -> v1::CameraIntrinsics {
     v1::CameraIntrinsics { fx_px, fy_px, cx_px, cy_px, distortion: distortion.to_vec() }
 }
 
-fn camera_from(proto: v1::CameraIntrinsics) -> Result<CameraIntrinsics, FieldError> {
+fn camera_from(proto: &v1::CameraIntrinsics) -> Result<CameraIntrinsics, FieldError> {
     Ok(CameraIntrinsics {
         fx_px: positive("fx_px", proto.fx_px)?,
         fy_px: positive("fy_px", proto.fy_px)?,
@@ -58,8 +58,8 @@ fn calibration_from(proto: v1::RigCalibration) -> Result<RigCalibration, FieldEr
     let rig = RigCalibration {
         width_px: proto.width_px,
         height_px: proto.height_px,
-        left: required("left", proto.left, camera_from)?,
-        right: required("right", proto.right, camera_from)?,
+        left: required("left", proto.left, |camera| camera_from(&camera))?,
+        right: required("right", proto.right, |camera| camera_from(&camera))?,
         right_from_left: rotation_matrix_from("right_from_left", &proto.right_from_left)?,
         right_from_left_m: required("right_from_left_m", proto.right_from_left_m, vector_from)?,
         body_from_camera: rotation_matrix_from("body_from_camera", &proto.body_from_camera)?,

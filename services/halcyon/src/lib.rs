@@ -9,4 +9,5 @@ pub mod fleet;
 pub mod lab;
 pub mod report;
 pub mod simulator;
+pub mod speed;
 pub mod witness;

@@ -9,12 +9,13 @@ mod options;
 mod reconstruct;
 mod rig;
 mod self_calibrate;
+mod speed;
 
 pub use calibrate::{
     CalibrateCliError, CalibrateReport, CalibrateRequest, CameraReport, CoverageReport, DepthReport, ErrorByViewsReport,
     ViewReport, calibrate, convert_rig,
 };
-pub use compare::{Matched, THESIS_SIZES_PX, TimeAtSize, compare, times_by_size};
+pub use compare::{Matched, THESIS_SIZES_PX, TimeAtSize, compare, refined, times_by_size};
 pub use features::{FeatureRow, FeaturesCliError, FeaturesOptions, FeaturesReport, PoseReport, features};
 pub use matching::{MatchCliError, MatchReport, TruthReport, match_pair};
 pub use options::{MatchOptions, OptionError};
@@ -27,5 +28,6 @@ pub use self_calibrate::{
     AlternativeReport, AngleReport, SelfCalibrateCliError, SelfCalibrateOptions, SelfCalibrateReport, SelfViewReport,
     self_calibrate,
 };
+pub use speed::{Spent, Threads, median, median_spent, spent};
 
 pub use crate::core::rig_budget::DISPARITY_SIGMA_PX;

@@ -1,16 +1,17 @@
 //! Engines side by side on one pair, for the lab: figures 4-23 and 5-6 (disparity maps), 4-24 (numbers of points), 5-17 (time by
 //! resolution).
 
-use std::time::Instant;
-
 use halcyon_model::Image;
 use opencv::core::{Mat, MatTraitConst, MatTraitConstManual, Size};
 use opencv::imgproc;
 
-use super::matching::cpu_s;
+use super::speed::{Spent, median, spent};
+use crate::core::cv;
 use crate::core::disparity::Disparity;
 use crate::core::disparity::score::{Score, SizeError, score};
 use crate::core::matcher::{DisparityRange, Engine, MatchError, match_images};
+use crate::core::reconstruct::{REFINE_ROUNDS, Settings};
+use crate::core::refine::Refiner;
 
 /// What one engine made of a pair.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,15 +45,9 @@ impl Matched {
 pub fn compare(left: &Image, right: &Image, range: DisparityRange, engines: &[Engine]) -> Result<Vec<Matched>, MatchError> {
     let one = |engine: &Engine| {
         let mut matcher = engine.matcher(engine.block_px_default());
-        let (wall, cpu_before_s) = (Instant::now(), cpu_s());
-        let disparity = match_images(matcher.as_mut(), left, right, range)?;
-        Ok(Matched {
-            engine: *engine,
-            points: disparity.matched(),
-            disparity,
-            wall_ms: wall.elapsed().as_secs_f64() * 1e3,
-            cpu_ms: cpu_before_s.zip(cpu_s()).map(|(before_s, after_s)| (after_s - before_s) * 1e3),
-        })
+        let (disparity, Spent { cpu_ms, wall_ms }) = spent(|| match_images(matcher.as_mut(), left, right, range));
+        let disparity = disparity?;
+        Ok(Matched { engine: *engine, points: disparity.matched(), disparity, cpu_ms, wall_ms })
     };
     engines.iter().map(one).collect()
 }
@@ -112,17 +107,12 @@ pub fn times_by_size(
                 disparities: engine.disparities(there),
                 engine: *engine,
                 cpu_ms: warm.iter().map(|run| run.cpu_ms).collect::<Option<Vec<_>>>().map(median),
-                wall_ms: median(warm.iter().map(|run| run.wall_ms).collect()),
+                wall_ms: median(warm.iter().map(|run| run.wall_ms)),
                 points: warm[0].points,
             });
         }
     }
     Ok(rows)
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 /// Resampled, by areas where it shrinks.
@@ -137,4 +127,19 @@ fn resized(image: &Image, width_px: u32, height_px: u32) -> Result<Image, MatchE
     let mut to = Mat::default();
     imgproc::resize(&from, &mut to, Size::new(width_px as i32, height_px as i32), 0.0, 0.0, how)?;
     Image::new(width_px, height_px, to.data_bytes()?.to_vec().into()).map_err(|_| size(width_px))
+}
+
+/// The disparity after the refinement of the default chain.
+///
+/// # Errors
+/// [`MatchError`] where pictures and disparity differ in size.
+pub fn refined(left: &Image, right: &Image, mut disparity: Disparity) -> Result<Disparity, MatchError> {
+    let exact = |image: &Image| -> opencv::Result<Mat> {
+        let mut exact = Mat::default();
+        cv::mat_from_image(image)?.convert_to(&mut exact, opencv::core::CV_32F, 1.0, 0.0)?;
+        Ok(exact)
+    };
+    let mut refiner = Refiner::new(Settings::default().refine_window_px, REFINE_ROUNDS);
+    refiner.refine(&exact(left)?, &exact(right)?, &mut disparity, &mut Vec::new())?;
+    Ok(disparity)
 }

@@ -1,11 +1,11 @@
 //! `halcyon match`
 
 use std::path::Path;
-use std::time::Instant;
 
 use serde::Serialize;
 
 use super::options::{MatchOptions, OptionError};
+use super::speed::{Spent, spent};
 use crate::core::disparity::Disparity;
 use crate::core::disparity::score::{Score, SizeError, score};
 use crate::core::disparity::{colour, pfm};
@@ -124,10 +124,8 @@ pub fn match_pair(
     }
     // Rounded up where the sum is no multiple of 16; still below the width, which the check above leaves room for.
     let range = DisparityRange { min_px: 0, max_px: (max_disparity_px.ceil() as u32).min(width_px - 1) };
-    let (wall, cpu_s) = (Instant::now(), cpu_s());
-    let disparity = match_images(matcher.as_mut(), &left, &right, range)?;
-    let wall_ms = wall.elapsed().as_secs_f64() * 1e3;
-    let cpu_ms = cpu_s.zip(self::cpu_s()).map(|(before_s, after_s)| (after_s - before_s) * 1e3);
+    let (disparity, Spent { cpu_ms, wall_ms }) = spent(|| match_images(matcher.as_mut(), &left, &right, range));
+    let disparity = disparity?;
     let truth = truth.map(|truth| score(&disparity, &truth)).transpose()?.map(TruthReport::from);
     let bytes = if as_png { colour::encode_png(&disparity).map_err(MatchError::from)? } else { pfm::encode(&disparity) };
     write_bytes(out, &bytes)?;
@@ -143,14 +141,4 @@ pub fn match_pair(
         wall_ms,
         truth,
     })
-}
-
-/// Processor time of this process so far, all threads, seconds, from Linux's `/proc` (in hundredths: `USER_HZ` is 100 on every
-/// architecture that Linux and we run on).
-pub(super) fn cpu_s() -> Option<f64> {
-    let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
-    // The name of the program, in brackets, may contain anything; numbers follow the last bracket.
-    let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
-    let ticks = fields.get(11)?.parse::<f64>().ok()? + fields.get(12)?.parse::<f64>().ok()?;
-    Some(ticks / 100.0)
 }

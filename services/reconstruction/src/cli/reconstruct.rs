@@ -5,14 +5,13 @@ mod report;
 mod survey;
 
 use std::path::Path;
-use std::time::Instant;
 
 use halcyon_model::{IdError, Image, PoseAtExposure, RigCalibration, RigId, Stamp, StereoPair, SurfacePatch};
 pub use options::{MeshOf, ReconstructOptions, given_pose};
 pub use report::{PatchReport, PlaneReport, ReconstructReport};
 pub use survey::{FailedPair, SurveyFrame, SurveyReport, reconstruct_survey};
 
-use super::matching::cpu_s;
+use super::speed::{Spent, spent};
 use crate::core::cloud::{CloudFrame, PointCloud, point_cloud};
 use crate::core::disparity::{colour, pfm};
 use crate::core::matcher::UnknownEngine;
@@ -120,13 +119,6 @@ fn stereo_pair(
     Ok(StereoPair { stamp, rig, sequence, left, right, exposure_s: 0.0, calibration, pose })
 }
 
-/// Processor and wall time, milliseconds.
-#[derive(Debug, Clone, Copy, Default)]
-struct Timing {
-    cpu_ms: Option<f64>,
-    wall_ms: f64,
-}
-
 /// The chain, which chooses its cell by the first patch where nobody did.
 struct Chain {
     reconstructor: Reconstructor,
@@ -142,16 +134,14 @@ impl Chain {
     }
 
     /// The patch of a pair, and what it took.
-    fn timed(&mut self, pair: &StereoPair) -> Result<(SurfacePatch, Timing), ReconstructError> {
+    fn timed(&mut self, pair: &StereoPair) -> Result<(SurfacePatch, Spent), ReconstructError> {
         if self.choose_cell {
             self.choose_cell(pair)?;
         }
-        let (wall, before_s) = (Instant::now(), cpu_s());
-        let mut patch = self.reconstructor.reconstruct(pair)?;
-        let wall_s = wall.elapsed().as_secs_f64();
-        patch.processing_s = wall_s;
-        let cpu_ms = before_s.zip(cpu_s()).map(|(before_s, after_s)| (after_s - before_s) * 1e3);
-        Ok((patch, Timing { cpu_ms, wall_ms: wall_s * 1e3 }))
+        let (patch, took) = spent(|| self.reconstructor.reconstruct(pair));
+        let mut patch = patch?;
+        patch.processing_s = took.wall_ms / 1e3;
+        Ok((patch, took))
     }
 
     /// How far the water is, and so how large a cell suits, only a first reconstruction tells; its own grid may well fail.

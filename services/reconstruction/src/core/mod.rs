@@ -3,13 +3,14 @@
 pub mod calibrate;
 pub mod camera;
 pub mod cloud;
-mod cv;
+pub(crate) mod cv;
 pub mod disparity;
 pub mod epipolar;
 pub mod features;
 pub mod grid;
 pub mod matcher;
 pub mod mesh;
+pub mod peer;
 pub mod plane;
 pub mod reconstruct;
 pub mod rectify;

@@ -68,7 +68,7 @@ impl Default for Settings {
 /// Disparity noise that is assumed where no refinement measures it, pixels: what semi-global matching leaves.
 const SIGMA_UNREFINED_PX: f32 = 0.2;
 /// Rounds of refinement: the first comes from a smoothed start within half a pixel, the second is for its curvature.
-const REFINE_ROUNDS: u32 = 2;
+pub(crate) const REFINE_ROUNDS: u32 = 2;
 /// A match that its own fit trusts less than this, pixels, is noise.
 const SIGMA_MAX_PX: f32 = 0.5;
 /// With fewer of the pixels matched than this the search range was wrong, or there was nothing to see.

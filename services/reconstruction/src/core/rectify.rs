@@ -1,7 +1,7 @@
 //! Rectification (thesis 4.5): both pictures warped as if taken by two equal, parallel cameras side by side, so that a match
 //! lies on the same row. The maps depend on the calibration alone and are computed once for it.
 
-use halcyon_model::{Image, RigCalibration};
+use halcyon_model::{CameraIntrinsics, Image, RigCalibration};
 use nalgebra::{Matrix3, Vector3};
 use opencv::calib3d;
 use opencv::core::{CV_8U, CV_32F, CV_32FC1, Mat, MatTraitConst, MatTraitConstManual, MatTraitManual, Scalar, Size};
@@ -135,14 +135,10 @@ impl Rectifier {
     /// [`RectifyError`] for numbers out of range, or cameras that are not side by side, left one left.
     pub fn new(calibration: &RigCalibration) -> Result<Self, RectifyError> {
         check(calibration)?;
-        let (left_matrix, left_distortion) =
-            (cv::mat_from_matrix3(&calibration.left.matrix())?, cv::mat_from_distortion(&calibration.left)?);
-        let (right_matrix, right_distortion) =
-            (cv::mat_from_matrix3(&calibration.right.matrix())?, cv::mat_from_distortion(&calibration.right)?);
-        let size = Size::new(calibration.width_px as i32, calibration.height_px as i32);
-        let cv::Rectification { left_rotation, right_rotation, left_projection, right_projection } =
-            cv::rectification(calibration, cv::View::Natural)?;
-        let (left, right) = (left_projection.data_typed::<f64>()?, right_projection.data_typed::<f64>()?);
+        let size = size_of(calibration);
+        let rectification = cv::rectification(calibration, cv::View::Natural)?;
+        let (left, right) =
+            (rectification.left_projection.data_typed::<f64>()?, rectification.right_projection.data_typed::<f64>()?);
         let rig = RectifiedRig {
             width_px: calibration.width_px,
             height_px: calibration.height_px,
@@ -150,10 +146,10 @@ impl Rectifier {
             cx_px: left[2],
             cy_px: left[6],
             baseline_m: -right[3] / right[0],
-            camera_from_rectified: cv::matrix3_from_mat(&left_rotation)?.transpose(),
+            camera_from_rectified: cv::matrix3_from_mat(&rectification.left_rotation)?.transpose(),
         };
-        let left = Side::new(&maps(&left_matrix, &left_distortion, &left_rotation, &left_projection, size)?, size)?;
-        let right = Side::new(&maps(&right_matrix, &right_distortion, &right_rotation, &right_projection, size)?, size)?;
+        let [left, right] = maps(calibration, &rectification)?;
+        let (left, right) = (Side::new(&left, size)?, Side::new(&right, size)?);
         Ok(Self { calibration: *calibration, rig, weights: Weights::new(), margined: Margined::default(), left, right })
     }
 
@@ -249,9 +245,30 @@ fn check(calibration: &RigCalibration) -> Result<(), RectifyError> {
     Ok(())
 }
 
-/// Where each rectified pixel comes from: x and y, `f32`.
-fn maps(matrix: &Mat, distortion: &Mat, rotation: &Mat, projection: &Mat, size: Size) -> opencv::Result<(Mat, Mat)> {
-    let (mut x, mut y) = (Mat::default(), Mat::default());
-    calib3d::init_undistort_rectify_map(matrix, distortion, rotation, projection, size, CV_32FC1, &mut x, &mut y)?;
-    Ok((x, y))
+fn size_of(calibration: &RigCalibration) -> Size {
+    Size::new(calibration.width_px as i32, calibration.height_px as i32)
+}
+
+/// Where each rectified pixel of the left and of the right picture comes from: x and y, `f32`.
+fn maps(calibration: &RigCalibration, rectification: &cv::Rectification) -> opencv::Result<[(Mat, Mat); 2]> {
+    let one = |camera: &CameraIntrinsics, rotation: &Mat, projection: &Mat| -> opencv::Result<(Mat, Mat)> {
+        let (matrix, distortion) = (cv::mat_from_matrix3(&camera.matrix())?, cv::mat_from_distortion(camera)?);
+        let (mut x, mut y) = (Mat::default(), Mat::default());
+        let size = size_of(calibration);
+        calib3d::init_undistort_rectify_map(&matrix, &distortion, rotation, projection, size, CV_32FC1, &mut x, &mut y)?;
+        Ok((x, y))
+    };
+    Ok([
+        one(&calibration.left, &rectification.left_rotation, &rectification.left_projection)?,
+        one(&calibration.right, &rectification.right_rotation, &rectification.right_projection)?,
+    ])
+}
+
+/// The maps of a rig, left then right, for peers that warp with them.
+///
+/// # Errors
+/// As [`Rectifier::new`].
+pub(super) fn maps_of(calibration: &RigCalibration) -> Result<[(Mat, Mat); 2], RectifyError> {
+    check(calibration)?;
+    Ok(maps(calibration, &cv::rectification(calibration, cv::View::Natural)?)?)
 }

@@ -111,9 +111,12 @@ mod tests {
         imgcodecs::imdecode(&Mat::from_slice(png).unwrap(), imgcodecs::IMREAD_COLOR).unwrap()
     }
 
+    /// Wider than the margin of 31 px that ORB keeps to every edge.
+    const SIDE_PX: u32 = 160;
+
     fn blobs() -> Image {
-        let level = |i: u32| if (i % 64 / 8 + i / 64 / 8).is_multiple_of(2) { 40 } else { 200 };
-        Image::new(64, 64, Bytes::from_iter((0..64 * 64).map(level))).unwrap()
+        let level = |i: u32| if (i % SIDE_PX / 8 + i / SIDE_PX / 8).is_multiple_of(2) { 40 } else { 200 };
+        Image::new(SIDE_PX, SIDE_PX, Bytes::from_iter((0..SIDE_PX * SIDE_PX).map(level))).unwrap()
     }
 
     #[test]

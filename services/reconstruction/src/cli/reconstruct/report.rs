@@ -3,7 +3,7 @@
 use halcyon_model::{Plane, SurfacePatch};
 use serde::Serialize;
 
-use super::Timing;
+use crate::cli::speed::Spent;
 use crate::core::cloud::CloudFrame;
 use crate::core::disparity::Disparity;
 
@@ -117,7 +117,7 @@ impl ReconstructReport {
         frame: CloudFrame,
         patch: &SurfacePatch,
         disparity: &Disparity,
-        timing: Timing,
+        timing: Spent,
     ) -> Self {
         Self {
             engine,

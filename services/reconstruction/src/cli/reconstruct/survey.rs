@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use halcyon_model::{PoseAtExposure, RigCalibration, Stamp, SurfacePatch};
 use serde::Serialize;
 
-use super::{Chain, PatchReport, PlaneReport, ReconstructCliError, ReconstructOptions, Timing, read_picture, stereo_pair};
+use super::{Chain, PatchReport, PlaneReport, ReconstructCliError, ReconstructOptions, read_picture, stereo_pair};
+use crate::cli::speed::Spent;
 use crate::core::cloud::CloudFrame;
 use crate::core::reconstruct::Settings;
 use crate::files::netcdf::Series;
@@ -125,7 +126,7 @@ fn one(
     calibration: &RigCalibration,
     frame: &SurveyFrame,
     sequence: u64,
-) -> Result<(SurfacePatch, Timing), ReconstructCliError> {
+) -> Result<(SurfacePatch, Spent), ReconstructCliError> {
     let (left, right) = (read_picture(&frame.left)?, read_picture(&frame.right)?);
     let pair = stereo_pair(*calibration, left, right, frame.pose, frame.stamp, sequence)?;
     Ok(chain.timed(&pair)?)
@@ -160,7 +161,7 @@ struct Sums {
 }
 
 impl Sums {
-    fn add(&mut self, patch: &SurfacePatch, timing: Timing) {
+    fn add(&mut self, patch: &SurfacePatch, timing: Spent) {
         let report = PatchReport::from(patch);
         self.patches += 1;
         self.first.get_or_insert(patch.stamp);

@@ -49,9 +49,46 @@ pub fn score(disparity: &Disparity, truth: &Disparity) -> Result<Score, SizeErro
     })
 }
 
+/// The truth without the pixels that only the left camera sees: beyond the right picture's left edge, or behind something nearer
+/// (Scharstein and Szeliski's "non-occluded").
+#[must_use]
+pub fn non_occluded(truth: &Disparity) -> Disparity {
+    let mut seen = truth.clone();
+    let width = truth.width_px as usize;
+    let mut nearest_px = vec![f32::NEG_INFINITY; width];
+    for row in seen.values_px.chunks_exact_mut(width.max(1)) {
+        nearest_px.fill(f32::NEG_INFINITY);
+        let place = |x: usize, disparity_px: f32| {
+            let right_px = (x as f32 - disparity_px).round();
+            (right_px >= 0.0 && right_px < width as f32).then_some(right_px as usize)
+        };
+        for (x, disparity_px) in row.iter().enumerate() {
+            if let Some(at) = place(x, *disparity_px) {
+                nearest_px[at] = nearest_px[at].max(*disparity_px);
+            }
+        }
+        for (x, disparity_px) in row.iter_mut().enumerate() {
+            // A slanted surface may put two pixels on one: a step of more than a pixel is another surface.
+            if !place(x, *disparity_px).is_some_and(|at| *disparity_px > nearest_px[at] - 1.0) {
+                *disparity_px = f32::NAN;
+            }
+        }
+    }
+    seen
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_foreground_hides_what_is_behind_it() {
+        // A bar with disparity 3 before a wall with 1: it covers right pixels 2 to 3, where the wall's left pixels 3 and 4 would be.
+        let truth = map(&[1.0, 1.0, 1.0, 1.0, 1.0, 3.0, 3.0, 1.0]);
+        let seen: Vec<bool> = non_occluded(&truth).values_px.iter().map(|value| value.is_finite()).collect();
+        assert_eq!(seen, [false, true, true, false, false, true, true, true]);
+        assert!(non_occluded(&Disparity::default()).values_px.is_empty());
+    }
 
     fn map(values_px: &[f32]) -> Disparity {
         Disparity { width_px: values_px.len() as u32, height_px: 1, values_px: values_px.to_vec() }
