@@ -6,6 +6,7 @@
     clippy::panic,
     clippy::expect_used,
     clippy::unwrap_used,
+    clippy::print_stdout,
     reason = "a test's support says what is wrong and ends the test"
 )]
 
@@ -50,7 +51,6 @@ pub fn free_port() -> u16 {
 }
 
 /// Holds off the other stories of a file: a fleet has the machine to itself, or its time runs ahead of it.
-#[must_use]
 pub fn alone() -> MutexGuard<'static, ()> {
     static MACHINE: Mutex<()> = Mutex::new(());
     MACHINE.lock().unwrap_or_else(PoisonError::into_inner)

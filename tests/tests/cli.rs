@@ -1,5 +1,7 @@
 //! The command line on real pictures, and in careless hands: one clear line and exit code 2.
 
+#![allow(clippy::expect_used, clippy::panic, reason = "tests fail by panicking")]
+
 use std::path::PathBuf;
 use std::process::{Command, Output};
 

@@ -1,5 +1,7 @@
 //! Dependencies point down only, and crates on one layer never see each other.
 
+#![allow(clippy::expect_used, reason = "tests fail by panicking")]
+
 use cargo_metadata::{DependencyKind, MetadataCommand};
 
 /// From the top. A crate may use what stands below its own line.

@@ -1,5 +1,7 @@
 //! The whole fleet in one process, as a new user starts it.
 
+#![allow(clippy::expect_used, clippy::panic, reason = "tests fail by panicking")]
+
 use std::process::Command;
 use std::time::Duration;
 

@@ -1,5 +1,7 @@
 //! The fleet as separate processes over Zenoh: each service its own program, attached to a host's router.
 
+#![allow(clippy::expect_used, reason = "tests fail by panicking")]
+
 use std::path::Path;
 use std::time::Duration;
 

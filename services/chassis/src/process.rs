@@ -222,6 +222,6 @@ pub fn runtime() -> std::io::Result<tokio::runtime::Runtime> {
 #[allow(clippy::print_stderr, reason = "the one place where a program says why it ends")]
 pub fn fail(error: &anyhow::Error) -> ExitCode {
     eprintln!("error: {error:#}");
-    let usage = error.chain().any(|cause| cause.is::<ConfigError>());
+    let usage = error.chain().any(<dyn std::error::Error>::is::<ConfigError>);
     if usage { ExitCode::from(EXIT_USAGE) } else { ExitCode::FAILURE }
 }

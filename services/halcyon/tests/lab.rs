@@ -1,7 +1,7 @@
 //! Every experiment of the lab that is not timed and not already in `accuracy.rs`, at its quick extent: it runs, it finds something, and
 //! what it finds is what the method is known for.
 
-#![allow(clippy::unwrap_used, reason = "tests fail by panicking")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
 use std::path::Path;
 

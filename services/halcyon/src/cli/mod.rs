@@ -66,7 +66,7 @@ enum Command {
 pub fn main() -> ExitCode {
     let Cli { options, command } = Cli::parse();
     let outcome = match command {
-        Command::Up(args) => up::run(&options, args),
+        Command::Up(args) => up::run(&options, &args),
         Command::Run(args) => run::run(&options, &args),
         Command::Calibrate(args) => calibrate::run(&args),
         Command::SelfCalibrate(args) => self_calibrate::run(&args),

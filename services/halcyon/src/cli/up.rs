@@ -70,7 +70,7 @@ impl World {
         sim.seed = self.seed.unwrap_or(sim.seed);
         sim.wind.speed_mps = self.wind.unwrap_or(sim.wind.speed_mps);
         if let Some(sea) = &self.sea {
-            sim.sea = sea.apply(sim.sea);
+            sim.sea = sea.apply(&sim.sea);
         }
         let config = simulator::Config(sim);
         config.validate().map_err(ConfigError::new)?;
@@ -109,14 +109,14 @@ impl FromStr for Sea {
 }
 
 impl Sea {
-    fn apply(&self, base: SeaConfig) -> SeaConfig {
+    fn apply(&self, base: &SeaConfig) -> SeaConfig {
         let number = |index: usize, base: f64| self.numbers.get(index).copied().unwrap_or(base);
         SeaConfig {
             kind: self.kind,
             height_m: number(0, base.height_m),
             period_s: number(1, base.period_s),
             direction_from_deg: number(2, base.direction_from_deg),
-            ..base
+            ..base.clone()
         }
     }
 }
@@ -161,10 +161,10 @@ fn point(text: &str) -> Result<LocalPoint, String> {
     }
 }
 
-pub(super) fn run(options: &Options, args: Args) -> anyhow::Result<ExitCode> {
+pub(super) fn run(options: &Options, args: &Args) -> anyhow::Result<ExitCode> {
     // Missions of a simulated world end with it: the store is for this run alone, and survives the planner's restarts.
     let folder = tempfile::Builder::new().prefix("halcyon-").tempdir()?;
-    let settings = settings(options, &args, folder.path())?;
+    let settings = settings(options, args, folder.path())?;
     let sim = settings.section::<simulator::Config>()?.0;
     let water = Water::new(&sim.sea, sim.seed).map_err(super::bad_input)?;
 
@@ -210,9 +210,9 @@ pub(super) fn run(options: &Options, args: Args) -> anyhow::Result<ExitCode> {
         spinner.finish_and_clear();
         let Some(report) = report else { return Ok(ExitCode::FAILURE) };
         if args.json {
-            output::json(&report)?
+            output::json(&report)?;
         } else {
-            print(&report)?
+            print(&report)?;
         }
         Ok(if report.outcome == "completed" { ExitCode::SUCCESS } else { ExitCode::FAILURE })
     })

@@ -168,7 +168,7 @@ impl Experiment {
             chapter.parse::<u32>().is_ok()
                 && self.shows.iter().any(|shown| shown.rsplit(' ').next().is_some_and(|n| n.split('-').next() == Some(chapter)))
         };
-        self.name == wanted || self.shows.iter().any(|s| shown(&s)) || chapter.is_some_and(of_chapter)
+        self.name == wanted || self.shows.iter().any(shown) || chapter.is_some_and(of_chapter)
     }
 }
 
