@@ -1,7 +1,7 @@
 # One verb a line. Everything that a bare Debian 12 with Rust and Node.js lacks is installed by `make setup`, which the others call.
 
 .DEFAULT_GOAL := help
-.PHONY: help run test lint lab format setup web samples docker clean
+.PHONY: help run test lint bench lab format setup web samples docker clean
 
 APT := libopencv-core-dev libopencv-calib3d-dev libopencv-imgcodecs-dev libopencv-imgproc-dev libopencv-features2d-dev \
        libopencv-videoio-dev libopencv-flann-dev clang libclang-dev libnetcdf-dev libsqlite3-dev pkg-config
@@ -21,6 +21,10 @@ test: build setup-test samples ## every test, browser tests in headless Chromium
 
 lab: build samples ## the thesis's tables and figures, its values beside ours: lab/index.html
 	target/debug/halcyon lab --out lab
+
+bench: build samples ## speed and exactness beside OpenCV, then each step of the chain by criterion
+	target/debug/halcyon bench
+	cargo bench --profile dev --workspace --bench chain
 
 lint: setup ## formatting, clippy and types
 	cargo fmt --all --check
