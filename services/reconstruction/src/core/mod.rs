@@ -22,3 +22,4 @@ pub mod self_calibrate;
 pub mod show;
 pub mod study;
 pub mod tilt;
+mod window;

@@ -4,11 +4,12 @@
 use halcyon_model::{CameraIntrinsics, Image, RigCalibration};
 use nalgebra::{Matrix3, Vector3};
 use opencv::calib3d;
-use opencv::core::{CV_8U, CV_32F, CV_32FC1, Mat, MatTraitConst, MatTraitConstManual, MatTraitManual, Scalar, Size};
+use opencv::core::{CV_8UC1, CV_32FC1, Mat, MatTraitConstManual, MatTraitManual, Scalar, Size};
+use rayon::prelude::*;
 
 use super::camera;
 use super::cv;
-use super::resample::{Margined, Place, Weights};
+use super::resample::{Margined, Place, ROWS_A_TASK, Weights};
 
 /// Why a calibration cannot be rectified.
 #[derive(Debug, thiserror::Error)]
@@ -113,18 +114,24 @@ impl Side {
         Ok(Self {
             places: x.iter().zip(y).map(|(x, y)| Margined::place(*x, *y, width, height)).collect(),
             inside: x.iter().zip(y).map(|(x, y)| (-0.5..=right).contains(x) && (-0.5..=bottom).contains(y)).collect(),
-            grey: Mat::default(),
+            grey: Mat::new_rows_cols_with_default(size.height, size.width, CV_8UC1, Scalar::default())?,
             exact: Mat::new_rows_cols_with_default(size.height, size.width, CV_32FC1, Scalar::default())?,
         })
     }
 
     fn warp(&mut self, image: &Image, margined: &mut Margined, weights: &Weights) -> opencv::Result<()> {
-        margined.fill(image.pixels(), image.width_px() as usize, image.height_px() as usize);
-        for (value, place) in self.exact.data_typed_mut::<f32>()?.iter_mut().zip(&self.places) {
-            *value = margined.sample(*place, weights);
-        }
-        debug_assert_eq!(self.exact.depth(), CV_32F);
-        self.exact.convert_to(&mut self.grey, CV_8U, 1.0, 0.0)
+        let width = image.width_px() as usize;
+        margined.fill(image.pixels(), width, image.height_px() as usize);
+        let margined = &*margined;
+        let exact = self.exact.data_typed_mut::<f32>()?.par_chunks_mut(width);
+        let rows = self.places.par_chunks(width).zip(exact.zip(self.grey.data_typed_mut::<u8>()?.par_chunks_mut(width)));
+        rows.with_min_len(ROWS_A_TASK).for_each(|(places, (exact, grey))| margined.sample(places, weights, exact, grey));
+        Ok(())
+    }
+
+    fn memory_bytes(&self) -> usize {
+        let pixels = self.places.len();
+        pixels * (size_of::<Place>() + size_of::<bool>() + size_of::<u8>() + size_of::<f32>())
     }
 }
 
@@ -135,7 +142,7 @@ impl Rectifier {
     /// [`RectifyError`] for numbers out of range, or cameras that are not side by side, left one left.
     pub fn new(calibration: &RigCalibration) -> Result<Self, RectifyError> {
         check(calibration)?;
-        let size = size_of(calibration);
+        let size = picture_size(calibration);
         let rectification = cv::rectification(calibration, cv::View::Natural)?;
         let (left, right) =
             (rectification.left_projection.data_typed::<f64>()?, rectification.right_projection.data_typed::<f64>()?);
@@ -203,6 +210,12 @@ impl Rectifier {
         Ok(())
     }
 
+    /// How many bytes maps and pictures hold.
+    #[must_use]
+    pub fn memory_bytes(&self) -> usize {
+        self.margined.memory_bytes() + self.left.memory_bytes() + self.right.memory_bytes()
+    }
+
     /// The last pair, rectified, left then right, 8-bit: for matchers and people.
     #[must_use]
     pub fn grey(&self) -> (&Mat, &Mat) {
@@ -245,7 +258,7 @@ fn check(calibration: &RigCalibration) -> Result<(), RectifyError> {
     Ok(())
 }
 
-fn size_of(calibration: &RigCalibration) -> Size {
+fn picture_size(calibration: &RigCalibration) -> Size {
     Size::new(calibration.width_px as i32, calibration.height_px as i32)
 }
 
@@ -254,7 +267,7 @@ fn maps(calibration: &RigCalibration, rectification: &cv::Rectification) -> open
     let one = |camera: &CameraIntrinsics, rotation: &Mat, projection: &Mat| -> opencv::Result<(Mat, Mat)> {
         let (matrix, distortion) = (cv::mat_from_matrix3(&camera.matrix())?, cv::mat_from_distortion(camera)?);
         let (mut x, mut y) = (Mat::default(), Mat::default());
-        let size = size_of(calibration);
+        let size = picture_size(calibration);
         calib3d::init_undistort_rectify_map(&matrix, &distortion, rotation, projection, size, CV_32FC1, &mut x, &mut y)?;
         Ok((x, y))
     };
