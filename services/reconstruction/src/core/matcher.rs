@@ -14,6 +14,8 @@ pub use sgbm::{SemiGlobalMatcher, SgbmMode};
 
 use super::cv;
 use super::disparity::Disparity;
+use super::guided::GuidedMatcher;
+use super::plane::DisparityPlane;
 use super::study;
 
 /// Which disparities to search: `min_px ..= max_px`, whole pixels.
@@ -99,6 +101,21 @@ pub trait Matcher: Send {
     /// # Errors
     /// [`MatchError`] where the pictures differ in size or the range does not fit into them.
     fn compute(&mut self, left: &Mat, right: &Mat, range: DisparityRange, disparity: &mut Disparity) -> Result<(), MatchError>;
+
+    /// Where the next pair's mean surface is expected, for engines that make use of that; `None` where nobody knows.
+    fn guide(&mut self, plane: Option<DisparityPlane>) {
+        let _ = plane;
+    }
+
+    /// Whether the last pair was searched about a plane only.
+    fn was_guided(&self) -> bool {
+        false
+    }
+
+    /// How many bytes its own buffers hold; OpenCV does not tell.
+    fn memory_bytes(&self) -> usize {
+        0
+    }
 }
 
 /// Matches two pictures with any engine: the convenient form of [`Matcher::compute`].
@@ -120,6 +137,8 @@ pub fn match_images(
 /// The engines, by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Engine {
+    /// Halcyon's own: a few disparities about the mean plane of the water; a general search where there is no plane.
+    Guided,
     /// OpenCV's block matching: fastest, sparse where texture is weak.
     Bm,
     /// OpenCV's semi-global matching (Hirschmüller 2008, thesis 4-16).
@@ -130,7 +149,8 @@ pub enum Engine {
 
 impl Engine {
     /// Every engine for work. Those for study are [`StudyMethod::ALL`].
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
+        Self::Guided,
         Self::Bm,
         Self::Sgbm(SgbmMode::FivePaths),
         Self::Sgbm(SgbmMode::ThreePaths),
@@ -142,6 +162,7 @@ impl Engine {
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
+            Self::Guided => "guided",
             Self::Bm => "bm",
             Self::Sgbm(SgbmMode::FivePaths) => "sgbm",
             Self::Sgbm(SgbmMode::ThreePaths) => "sgbm-3way",
@@ -155,6 +176,7 @@ impl Engine {
     #[must_use]
     pub fn matcher(self, block_px: u32) -> Box<dyn Matcher> {
         match self {
+            Self::Guided => Box::new(GuidedMatcher::new(block_px, GENERAL.matcher(GENERAL.block_px_default()))),
             Self::Bm => Box::new(BlockMatcher::new(block_px)),
             Self::Sgbm(mode) => Box::new(SemiGlobalMatcher::new(mode, block_px)),
             Self::Study(method) => Box::new(study::ReferenceMatcher::new(study::Settings::new(method, block_px))),
@@ -168,7 +190,7 @@ impl Engine {
         match self {
             Self::Bm => Some(Box::new(BlockMatcher::new(block_px).without_margin())),
             Self::Sgbm(mode) => Some(Box::new(SemiGlobalMatcher::new(mode, block_px).without_margin())),
-            Self::Study(_) => None,
+            Self::Guided | Self::Study(_) => None,
         }
     }
 
@@ -177,6 +199,7 @@ impl Engine {
     #[must_use]
     pub fn block_px_default(self) -> u32 {
         match self {
+            Self::Guided => 9,
             Self::Bm => 15,
             Self::Sgbm(_) => 5,
             Self::Study(method) => method.window_px_default(),
@@ -188,15 +211,18 @@ impl Engine {
     pub fn disparities(self, range: DisparityRange) -> u32 {
         match self {
             Self::Bm | Self::Sgbm(_) => range.count(),
-            Self::Study(_) => range.max_px.saturating_sub(range.min_px) + 1,
+            Self::Guided | Self::Study(_) => range.max_px.saturating_sub(range.min_px) + 1,
         }
     }
 }
 
+/// What `guided` searches with where no plane explains a pair.
+const GENERAL: Engine = Engine::Sgbm(SgbmMode::FivePaths);
+
 /// No engine of that name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "no matching engine is called {0:?}: there are bm, sgbm, sgbm-3way, sgbm-hh4, sgbm-hh and, for study, wta- or sgm- with sad, ssd, ncc, rank, census or mi"
+    "no matching engine is called {0:?}: there are guided, bm, sgbm, sgbm-3way, sgbm-hh4, sgbm-hh and, for study, wta- or sgm- with sad, ssd, ncc, rank, census or mi"
 )]
 pub struct UnknownEngine(String);
 

@@ -8,6 +8,7 @@ pub mod disparity;
 pub mod epipolar;
 pub mod features;
 pub mod grid;
+pub mod guided;
 pub mod matcher;
 pub mod mesh;
 pub mod peer;

@@ -87,15 +87,53 @@ pub fn fit(matches: &mut Vec<Match>, rig: &RectifiedRig, points_min: usize, seed
     least_squares(matches, rig).ok_or(PlaneError::NoPlane)
 }
 
-/// d = a x + b y + c.
-#[derive(Debug, Clone, Copy)]
-struct DisparityPlane {
+/// A plane in space as disparities: d = a x + b y + c, pixels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DisparityPlane {
     a: f32,
     b: f32,
     c: f32,
 }
 
 impl DisparityPlane {
+    /// The same in every pixel.
+    #[must_use]
+    pub fn level(disparity_px: f32) -> Self {
+        Self { a: 0.0, b: 0.0, c: disparity_px }
+    }
+
+    /// Through three pixels (x, y) with disparities; `None` where they are on a line.
+    #[must_use]
+    pub fn through_px(pixels: [(f32, f32, f32); 3]) -> Option<Self> {
+        let [p, q, r] = pixels.map(|(x_px, y_px, disparity_px)| Match { x_px, y_px, disparity_px, sigma_px: 0.0 });
+        Self::through(&p, &q, &r)
+    }
+
+    /// Of a plane of the rectified left camera: d(u, v) = (f b / D) (n · r(u, v)). `None` for a plane that is none.
+    #[must_use]
+    pub fn of(plane: &Plane, rig: &RectifiedRig) -> Option<Self> {
+        let n = plane.normal * (rig.baseline_m / plane.distance_m);
+        let c = rig.focal_px * n.z - n.x * rig.cx_px - n.y * rig.cy_px;
+        let [a, b, c] = [n.x, n.y, c].map(|x| x as f32);
+        (a.is_finite() && b.is_finite() && c.is_finite()).then_some(Self { a, b, c })
+    }
+
+    /// Disparity of the plane at a pixel, pixels.
+    #[must_use]
+    #[inline(always)]
+    pub fn at(&self, x_px: f32, y_px: f32) -> f32 {
+        self.a * x_px + self.b * y_px + self.c
+    }
+
+    /// The plane with the least median deviation of `judges` among planes through three `matches`, and the standard deviation that
+    /// this median stands for, pixels. `None` without three matches that are on no line.
+    pub(crate) fn robust(matches: &[Match], judges: &[Match], seed: u64) -> Option<(Self, f32)> {
+        if matches.len() < 3 || judges.is_empty() {
+            return None;
+        }
+        least_median(matches, judges, &mut ChaCha8Rng::seed_from_u64(seed), &mut Vec::with_capacity(judges.len()))
+    }
+
     /// Through three matches; `None` where they are on a line.
     fn through(p: &Match, q: &Match, r: &Match) -> Option<Self> {
         let (x1, y1, d1) = (q.x_px - p.x_px, q.y_px - p.y_px, q.disparity_px - p.disparity_px);
@@ -110,7 +148,7 @@ impl DisparityPlane {
     }
 
     /// The least-squares plane of the matches within `limit_px` of this one.
-    fn refit(&self, matches: &[Match], limit_px: f32) -> Option<Self> {
+    pub(crate) fn refit(&self, matches: &[Match], limit_px: f32) -> Option<Self> {
         // About a point in the middle, so that the normal equations are well conditioned.
         let origin = matches.get(matches.len() / 2)?;
         let (mut normal, mut right) = (Matrix3::<f64>::zeros(), Vector3::<f64>::zeros());
@@ -125,8 +163,8 @@ impl DisparityPlane {
         Some(Self { a: self.a + a, b: self.b + b, c: self.c + c })
     }
 
-    fn residual(&self, point: &Match) -> f32 {
-        point.disparity_px - (self.a * point.x_px + self.b * point.y_px + self.c)
+    pub(crate) fn residual(&self, point: &Match) -> f32 {
+        point.disparity_px - self.at(point.x_px, point.y_px)
     }
 }
 

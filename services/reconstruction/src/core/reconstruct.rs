@@ -16,7 +16,7 @@ pub use world::WorldFromRectified;
 use super::disparity::{Disparity, colour};
 use super::grid::{GridError, Gridder, Sampling, SurfacePoint, remove_mean};
 use super::matcher::{DisparityRange, Engine, MatchError, Matcher};
-use super::plane::{self, Match, PlaneError};
+use super::plane::{self, DisparityPlane, Match, PlaneError};
 use super::rectify::{RectifiedRig, Rectifier, RectifyError};
 use super::refine::Refiner;
 use super::scatter::Scatter;
@@ -51,8 +51,8 @@ pub struct Settings {
 impl Default for Settings {
     fn default() -> Self {
         Self {
-            engine: Engine::Sgbm(super::matcher::SgbmMode::FivePaths),
-            block_px: 5,
+            engine: Engine::Guided,
+            block_px: Engine::Guided.block_px_default(),
             range: DisparityRange { min_px: 0, max_px: 127 },
             height_margin_m: 0.75,
             refine_window_px: 11,
@@ -124,6 +124,8 @@ pub struct Reconstructor {
     /// Mean depth of the last pair's points in the rectified left camera, metres.
     mean_depth_m: f64,
     last_pair: Option<(halcyon_model::Stamp, halcyon_model::RigId)>,
+    /// Of the last pair, in the rectified left camera.
+    last_plane: Option<Plane>,
 }
 
 impl Reconstructor {
@@ -147,6 +149,7 @@ impl Reconstructor {
             points: Vec::new(),
             mean_depth_m: f64::NAN,
             last_pair: None,
+            last_plane: None,
         }
     }
 
@@ -182,6 +185,7 @@ impl Reconstructor {
         // The level that a search may start from is the autopilot's wander; a fixed rig searches by its own pairs.
         self.level_m = if pair.pose.is_some() { level_m } else { 0.0 };
         self.last_pair = Some((pair.stamp, pair.rig.clone()));
+        self.last_plane = Some(plane);
         Ok(SurfacePatch {
             stamp: pair.stamp,
             rig: pair.rig.clone(),
@@ -246,6 +250,24 @@ impl Reconstructor {
         self.rectifier.as_ref()
     }
 
+    /// Whether the last pair was searched about a plane only.
+    #[must_use]
+    pub fn was_guided(&self) -> bool {
+        self.matcher.was_guided()
+    }
+
+    /// How many bytes the chain's own buffers hold.
+    #[must_use]
+    pub fn memory_bytes(&self) -> usize {
+        let floats = self.disparity.values_px.capacity() + self.sigma_px.capacity();
+        size_of::<f32>() * floats
+            + size_of::<Match>() * self.matches.capacity()
+            + size_of::<SurfacePoint>() * self.points.capacity()
+            + self.rectifier.as_ref().map_or(0, Rectifier::memory_bytes)
+            + self.refiner.as_ref().map_or(0, Refiner::memory_bytes)
+            + self.matcher.memory_bytes()
+    }
+
     /// The rectified cameras of the last pair.
     #[must_use]
     pub fn rectified_rig(&self) -> Option<&RectifiedRig> {
@@ -269,14 +291,15 @@ impl Reconstructor {
         // Where less than a quarter of the picture is in common there is little to measure.
         let useful_px = rig.width_px * 3 / 4;
         let world = pair.pose.as_ref().map(|pose| WorldFromRectified::from_pose(pose, &pair.calibration, rig));
+        let guide = self.guide(world.as_ref(), rig);
         let expected = world.and_then(|world| expected_range(&world, rig, self.level_m, self.settings.height_margin_m));
         if let Some(expected) = expected
             && expected.min_px < useful_px
-            && let Ok(plane) = self.match_in(DisparityRange { max_px: expected.max_px.min(useful_px), ..expected }, rig)
+            && let Ok(plane) = self.match_in(DisparityRange { max_px: expected.max_px.min(useful_px), ..expected }, guide, rig)
         {
             return Ok(plane);
         }
-        self.match_in(full, rig).map_err(|error| {
+        self.match_in(full, guide, rig).map_err(|error| {
             let height_m = world.map_or(f64::INFINITY, |world| -world.origin_ned_m.z - self.level_m);
             let disparity_px = rig.focal_px * rig.baseline_m / height_m;
             let too_close = height_m > 0.0 && disparity_px > f64::from(useful_px);
@@ -284,9 +307,28 @@ impl Reconstructor {
         })
     }
 
-    fn match_in(&mut self, range: DisparityRange, rig: &RectifiedRig) -> Result<Plane, ReconstructError> {
+    /// Where the mean water plane should be: level water below the autopilot's pose, or else where it was.
+    fn guide(&self, world: Option<&WorldFromRectified>, rig: &RectifiedRig) -> Option<DisparityPlane> {
+        let plane = match world {
+            Some(world) => Plane {
+                normal: world.rotation.row(2).transpose(),
+                distance_m: -world.origin_ned_m.z - self.level_m,
+                rms_m: 0.0,
+            },
+            None => self.last_plane?,
+        };
+        if plane.distance_m > 0.0 { DisparityPlane::of(&plane, rig) } else { None }
+    }
+
+    fn match_in(
+        &mut self,
+        range: DisparityRange,
+        guide: Option<DisparityPlane>,
+        rig: &RectifiedRig,
+    ) -> Result<Plane, ReconstructError> {
         let Some(rectifier) = &self.rectifier else { return Err(RectifyError::Invalid("size").into()) };
         let (left, right) = rectifier.grey();
+        self.matcher.guide(guide);
         self.matcher.compute(left, right, range, &mut self.disparity)?;
         let enough = (DENSITY_MIN * self.disparity.values_px.len() as f64) as usize;
         let matched = self.disparity.values_px.iter().filter(|value| value.is_finite()).count();

@@ -15,12 +15,12 @@ use residual::Residual;
 
 use super::disparity::Disparity;
 use super::matcher::{DisparityRange, MatchError, Matcher, check};
-use super::plane::DisparityPlane;
+use super::plane::{DisparityPlane, Match};
 
 /// How far from the plane to search, pixels, one after the other.
 const REACHES_PX: [u32; 4] = [6, 12, 24, 48];
 /// Where more of the winners than this are at an end of the range, some water is beyond it.
-const AT_ENDS_MAX: f64 = 0.01;
+const AT_ENDS_MAX: f64 = 0.005;
 /// A plane that fits finds a match for at least this share of the pixels that both cameras see.
 const FOUND_MIN: f64 = 0.5;
 
@@ -77,10 +77,9 @@ impl Matcher for GuidedMatcher {
         check(left, right, range, self.residual.window_px())?;
         self.was_guided = false;
         let guide = self.guide.take();
-        let (left_px, right_px) = (left.try_clone_if_needed()?, right.try_clone_if_needed()?);
         let pair = Pair {
-            left: left_px.data_typed::<u8>()?,
-            right: right_px.data_typed::<u8>()?,
+            left: left.data_typed::<u8>()?,
+            right: right.data_typed::<u8>()?,
             width: left.cols() as usize,
             height: left.rows() as usize,
         };
@@ -112,3 +111,22 @@ impl Matcher for GuidedMatcher {
         self.residual.memory_bytes()
     }
 }
+
+/// The plane through what was found, wherever that is.
+fn plane_through(disparity: &Disparity) -> Option<DisparityPlane> {
+    /// Enough for a plane.
+    const SAMPLES: usize = 4096;
+    let width = disparity.width_px as usize;
+    let step = (disparity.values_px.len() / SAMPLES).max(1) | 1;
+    let matches: Vec<Match> = (0..disparity.values_px.len())
+        .step_by(step)
+        .map(|i| (i, disparity.values_px[i]))
+        .filter(|(_, value_px)| value_px.is_finite())
+        .map(|(i, disparity_px)| Match { x_px: (i % width) as f32, y_px: (i / width) as f32, disparity_px, sigma_px: 0.5 })
+        .collect();
+    let (plane, sigma_px) = DisparityPlane::robust(&matches, &matches, 1)?;
+    plane.refit(&matches, (3.0 * sigma_px).max(1.0))
+}
+
+#[cfg(test)]
+mod tests;
