@@ -1,0 +1,195 @@
+//! One strip of 64 rows, matched by itself.
+//!
+//! A sweep needs the whole width before the sweep back may begin, and a strip's path costs (`width × count × 64` bytes) are far
+//! larger than a cache. So the first sweep only leaves checkpoints, one each few columns; on the way back, a block of columns
+//! after the other is swept again from its checkpoint, this time keeping costs and sums, and completed in the cache. That is a
+//! third more arithmetic in place of main memory's bandwidth, and needs a few MB whatever the picture.
+
+use super::View;
+use super::agree::left_right;
+use super::census::{Census, Transposed};
+use super::choose::{Number, choose};
+use super::lanes::{LANES, Lanes};
+use super::sweep::{BEGIN, CARRY, COMPLETE, Columns, Front, Penalties, step};
+use super::{Paths, Settings};
+
+/// Bytes that the costs of a block may take: with as many of sums, a quarter or so of a core's second-level cache.
+const BLOCK_BYTES: usize = 1 << 18;
+
+/// A strip to be matched.
+pub(super) struct Job<'a> {
+    pub(super) left: View<'a>,
+    pub(super) right: View<'a>,
+    pub(super) min_px: i32,
+    pub(super) count: usize,
+    pub(super) settings: Settings,
+    /// The picture's row of the first of 64; beyond the last row it is repeated.
+    pub(super) first_row: usize,
+    /// How many rows above what is kept; these only lead the paths in.
+    pub(super) lead: usize,
+}
+
+/// Where the rows that are kept go.
+pub(super) struct Output<'a> {
+    /// Disparities, pixels.
+    pub(super) disparity_px: &'a mut [f32],
+    /// Their sums.
+    pub(super) sums: &'a mut [u8],
+}
+
+/// What a strip needs; kept from strip to strip.
+#[derive(Debug, Default)]
+pub(super) struct Workspace {
+    left: Transposed,
+    right: Transposed,
+    five: Planes<3>,
+    nine: Planes<4>,
+    seven: Planes<6>,
+    three: Fronts<3>,
+    two: Fronts<2>,
+    costs: Vec<Lanes>,
+    sums: Vec<Lanes>,
+    pub(super) right_row: Vec<(u8, i16)>,
+}
+
+#[derive(Debug, Default)]
+struct Planes<const BYTES: usize> {
+    left: Vec<[Lanes; BYTES]>,
+    right: Vec<[Lanes; BYTES]>,
+}
+
+#[derive(Debug, Default)]
+struct Fronts<const PATHS: usize> {
+    checkpoints: Vec<Checkpoint<PATHS>>,
+    now: Checkpoint<PATHS>,
+}
+
+#[derive(Debug, Clone)]
+struct Checkpoint<const PATHS: usize>([Front; PATHS]);
+
+impl<const PATHS: usize> Default for Checkpoint<PATHS> {
+    fn default() -> Self {
+        Self(std::array::from_fn(|_| Front::default()))
+    }
+}
+
+/// Matches a strip.
+#[inline(always)]
+pub(super) fn run(job: &Job<'_>, workspace: &mut Workspace, output: Output<'_>) {
+    match job.settings.census {
+        Census::Five => with_census::<3>(job, workspace, output, |workspace| &mut workspace.five),
+        Census::NineSymmetric => with_census::<4>(job, workspace, output, |workspace| &mut workspace.nine),
+        Census::Seven => with_census::<6>(job, workspace, output, |workspace| &mut workspace.seven),
+    }
+}
+
+#[inline(always)]
+fn with_census<const BYTES: usize>(
+    job: &Job<'_>,
+    workspace: &mut Workspace,
+    mut output: Output<'_>,
+    planes_of: impl Fn(&mut Workspace) -> &mut Planes<BYTES>,
+) {
+    workspace.left.fill(job.left, job.first_row);
+    workspace.right.fill(job.right, job.first_row);
+    let mut planes = std::mem::take(planes_of(workspace));
+    workspace.left.census(job.settings.census, &mut planes.left);
+    workspace.right.census(job.settings.census, &mut planes.right);
+    let columns =
+        Columns { left: &planes.left, right: &planes.right, min_px: job.min_px as isize, count: job.count };
+    let Workspace { three, two, costs, sums, .. } = workspace;
+    match job.settings.paths {
+        Paths::Four => sweep::<BYTES, 2>(job, &columns, two, (costs, sums), &mut output),
+        Paths::Eight => sweep::<BYTES, 3>(job, &columns, three, (costs, sums), &mut output),
+    }
+    *planes_of(workspace) = planes;
+    left_right(job, &mut workspace.right_row, output);
+}
+
+#[inline(always)]
+fn sweep<const BYTES: usize, const PATHS: usize>(
+    job: &Job<'_>,
+    columns: &Columns<'_, BYTES>,
+    fronts: &mut Fronts<PATHS>,
+    (costs, sums): (&mut Vec<Lanes>, &mut Vec<Lanes>),
+    output: &mut Output<'_>,
+) {
+    let (width, count) = (job.left.width, job.count);
+    let penalties = Penalties { p1: job.settings.p1, p2: job.settings.p2 };
+    let block = (BLOCK_BYTES / (count * LANES)).clamp(1, width);
+    costs.resize(block * count, [0; LANES]);
+    sums.resize(block * count, [0; LANES]);
+    let Fronts { checkpoints, now } = fronts;
+    checkpoints.resize_with(width.div_ceil(block), Checkpoint::default);
+
+    now.0.iter_mut().for_each(|front| front.reset(count));
+    for (number, checkpoint) in checkpoints.iter_mut().enumerate() {
+        for (to, from) in checkpoint.0.iter_mut().zip(&now.0) {
+            to.copy_from(from);
+        }
+        // Nothing follows the last one.
+        if (number + 1) * block < width {
+            for x in number * block..(number + 1) * block {
+                step::<BYTES, PATHS, CARRY>(columns, x, penalties, &mut now.0, &mut [], &mut []);
+            }
+        }
+    }
+    now.0.iter_mut().for_each(|front| front.reset(count));
+    for (number, checkpoint) in checkpoints.iter_mut().enumerate().rev() {
+        let first = number * block;
+        let last = (first + block).min(width);
+        for x in first..last {
+            let at = (x - first) * count;
+            let (costs, sums) = (&mut costs[at..at + count], &mut sums[at..at + count]);
+            step::<BYTES, PATHS, BEGIN>(columns, x, penalties, &mut checkpoint.0, costs, sums);
+        }
+        for x in (first..last).rev() {
+            let at = (x - first) * count;
+            let (costs, sums) = (&mut costs[at..at + count], &mut sums[at..at + count]);
+            step::<BYTES, PATHS, COMPLETE>(columns, x, penalties, &mut now.0, costs, sums);
+            if count <= 1 << 8 {
+                write::<u8>(job, x, sums, output);
+            } else {
+                write::<u16>(job, x, sums, output);
+            }
+        }
+    }
+}
+
+/// Chooses for column `x` and writes what is kept.
+#[inline(always)]
+fn write<N: Number>(job: &Job<'_>, x: usize, sums: &[Lanes], output: &mut Output<'_>) {
+    let winners = choose::<N>(sums, job.settings.uniqueness_percent);
+    let width = job.left.width;
+    let rows = output.disparity_px.chunks_exact_mut(width).zip(output.sums.chunks_exact_mut(width));
+    for (i, (disparities, sums)) in rows.enumerate() {
+        let disparity_px = winners.disparity_px[job.lead + i] + job.min_px as f32;
+        // A match beyond the right picture's edges was never seen.
+        let at_px = x as f32 - disparity_px;
+        let seen = at_px >= 0.0 && at_px <= (width - 1) as f32;
+        disparities[x] = if seen { disparity_px } else { f32::NAN };
+        sums[x] = winners.sum[job.lead + i];
+    }
+}
+
+impl Workspace {
+    /// Bytes held.
+    pub(super) fn memory_bytes(&self) -> usize {
+        fn planes<const BYTES: usize>(planes: &Planes<BYTES>) -> usize {
+            (planes.left.capacity() + planes.right.capacity()) * BYTES * LANES
+        }
+        fn fronts<const PATHS: usize>(fronts: &Fronts<PATHS>) -> usize {
+            let all = fronts.checkpoints.iter().chain(std::iter::once(&fronts.now));
+            all.flat_map(|checkpoint| &checkpoint.0).map(Front::memory_bytes).sum()
+        }
+        planes(&self.five)
+            + planes(&self.nine)
+            + planes(&self.seven)
+            + fronts(&self.two)
+            + fronts(&self.three)
+            + (self.costs.capacity() + self.sums.capacity()) * LANES
+            + self.left.memory_bytes()
+            + self.right.memory_bytes()
+            + self.right_row.capacity() * size_of::<(u8, i16)>()
+    }
+}

@@ -1,0 +1,160 @@
+//! Costs summed along paths (Hirschmüller 2008, thesis 4-16), one column after the other:
+//!
+//! L(p, d) = C(p, d) + min(L(q, d), L(q, d ± 1) + P1, min L(q, ·) + P2) − min L(q, ·),
+//!
+//! where q is the pixel before p on the path. A sweep to the right carries the paths that come from the left (level, from above,
+//! from below), one to the left those from the right. All of them step from one column to the next, so that the rows of a column
+//! do not depend on each other and 64 of them are worked on at once.
+
+use super::census::hamming;
+use super::lanes::{LANES, Lanes, all, load, store};
+
+/// What a step of disparity costs.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Penalties {
+    /// By one.
+    pub(super) p1: u8,
+    /// By more.
+    pub(super) p2: u8,
+}
+
+/// Along which of the paths that a sweep can carry: how many rows the next pixel lies further down.
+pub(super) const fn slopes<const PATHS: usize>() -> [isize; PATHS] {
+    let mut slopes = [0; PATHS];
+    let all = if PATHS == 2 { [1, -1, 0] } else { [0, 1, -1] };
+    let mut i = 0;
+    while i < PATHS {
+        slopes[i] = all[i];
+        i += 1;
+    }
+    slopes
+}
+
+/// Path costs of the column before, in place of which those of the next are written.
+///
+/// They are stored where the next column reads them: a path that falls by a row stores row 5 where row 6 is read. A path that
+/// enters the strip finds zeros there, and so begins with the cost of its first pixel.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Front {
+    /// `count` disparities of 64 rows, with 64 bytes before and after for what is shifted out.
+    bytes: Vec<u8>,
+    /// The least of each row, in the middle of three.
+    least: Vec<u8>,
+}
+
+impl Front {
+    /// Paths that have not begun.
+    pub(super) fn reset(&mut self, count: usize) {
+        self.bytes.clear();
+        self.bytes.resize((count + 2) * LANES, 0);
+        self.least.clear();
+        self.least.resize(3 * LANES, 0);
+    }
+
+    /// Becomes a copy of `other`, without allocation where it has been as large before.
+    #[inline(always)]
+    pub(super) fn copy_from(&mut self, other: &Self) {
+        self.bytes.clone_from(&other.bytes);
+        self.least.clone_from(&other.least);
+    }
+
+    pub(super) fn memory_bytes(&self) -> usize {
+        self.bytes.capacity() + self.least.capacity()
+    }
+}
+
+/// Only carry the paths on.
+pub(super) const CARRY: u8 = 0;
+/// Carry, and begin the sums: costs and sums are written.
+pub(super) const BEGIN: u8 = 1;
+/// Carry, and complete the sums: costs are read, sums are added to.
+pub(super) const COMPLETE: u8 = 2;
+
+/// The columns that are compared.
+#[derive(Clone, Copy)]
+pub(super) struct Columns<'a, const BYTES: usize> {
+    /// Census of the left picture, all columns.
+    pub(super) left: &'a [[Lanes; BYTES]],
+    /// Census of the right picture.
+    pub(super) right: &'a [[Lanes; BYTES]],
+    /// Least disparity, pixels.
+    pub(super) min_px: isize,
+    /// How many disparities.
+    pub(super) count: usize,
+}
+
+impl<const BYTES: usize> Columns<'_, BYTES> {
+    /// Census of the right picture at a disparity from left column `x`; beyond its edges the edge goes on.
+    #[inline(always)]
+    fn opposite(&self, x: usize, disparity: usize) -> &[Lanes; BYTES] {
+        let last = self.right.len() - 1;
+        &self.right[(x as isize - self.min_px - disparity as isize).clamp(0, last as isize) as usize]
+    }
+}
+
+/// Takes all paths of a sweep to column `x`. `costs` and `sums` have one entry a disparity (see [`BEGIN`], [`COMPLETE`]).
+#[inline(always)]
+pub(super) fn step<const BYTES: usize, const PATHS: usize, const MODE: u8>(
+    columns: &Columns<'_, BYTES>,
+    x: usize,
+    penalties: Penalties,
+    fronts: &mut [Front; PATHS],
+    costs: &mut [Lanes],
+    sums: &mut [Lanes],
+) {
+    let slopes = slopes::<PATHS>();
+    let Penalties { p1, p2 } = penalties;
+    let left = columns.left[x];
+    let count = columns.count;
+    let (costs, sums) = if MODE == CARRY { (costs, sums) } else { (&mut costs[..count], &mut sums[..count]) };
+    // Of each path: L(q, d − 1) + P1, L(q, d), min L(q, ·), that + P2, and the least of the new column.
+    let mut below = [all(u8::MAX); PATHS];
+    let mut here: [Lanes; PATHS] = std::array::from_fn(|p| load(&fronts[p].bytes, LANES));
+    let before: [Lanes; PATHS] = std::array::from_fn(|p| load(&fronts[p].least, LANES));
+    let mut jump = before;
+    let mut least = [all(u8::MAX); PATHS];
+    for p in 0..PATHS {
+        for i in 0..LANES {
+            jump[p][i] = before[p][i].saturating_add(p2);
+        }
+    }
+    for d in 0..count {
+        let cost = if MODE == COMPLETE { costs[d] } else { hamming(&left, columns.opposite(x, d)) };
+        let mut sum = if MODE == COMPLETE { sums[d] } else { [0; LANES] };
+        for p in 0..PATHS {
+            let row = (d + 1) * LANES;
+            let above = if d + 1 < count { load(&fronts[p].bytes, row + LANES) } else { all(u8::MAX) };
+            let mut to = [0; LANES];
+            for i in 0..LANES {
+                let beside = below[p][i].min(above[i].saturating_add(p1));
+                let value = here[p][i].min(beside).min(jump[p][i]).wrapping_sub(before[p][i]).wrapping_add(cost[i]);
+                least[p][i] = least[p][i].min(value);
+                sum[i] = sum[i].saturating_add(value);
+                below[p][i] = here[p][i].saturating_add(p1);
+                to[i] = value;
+            }
+            leave(&mut to, slopes[p]);
+            store(&mut fronts[p].bytes, row.wrapping_add_signed(slopes[p]), &to);
+            here[p] = above;
+        }
+        if MODE == BEGIN {
+            costs[d] = cost;
+        }
+        if MODE != CARRY {
+            sums[d] = sum;
+        }
+    }
+    for p in 0..PATHS {
+        leave(&mut least[p], slopes[p]);
+        store(&mut fronts[p].least, LANES.wrapping_add_signed(slopes[p]), &least[p]);
+    }
+}
+
+/// The path that leaves the strip is forgotten: what is shifted out must be the zero of a path that enters.
+#[inline(always)]
+fn leave(lanes: &mut Lanes, slope: isize) {
+    for i in 0..LANES {
+        let leaves = (slope > 0 && i == LANES - 1) || (slope < 0 && i == 0);
+        lanes[i] = if leaves { 0 } else { lanes[i] };
+    }
+}
