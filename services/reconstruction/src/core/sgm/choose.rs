@@ -50,6 +50,12 @@ impl Number for u16 {
     }
 }
 
+/// All bits where it is true.
+#[inline(always)]
+fn mask(is: bool) -> u8 {
+    u8::from(is).wrapping_neg()
+}
+
 /// What won in one column, for each of 64 rows.
 pub(super) struct Winners {
     /// Disparity above the least one, pixels; NaN where no one won.
@@ -75,11 +81,12 @@ pub(super) fn choose<N: Number>(sums: &[Lanes], uniqueness_percent: u8) -> Winne
     for (d, sum) in sums.iter().enumerate() {
         let number = N::of(d);
         for i in 0..LANES {
+            // Masks, not branches: a choice between two bytes in memory would be made one row at a time.
             let off = number.minus(best[i]);
-            below[i] = if off == N::MINUS_ONE { sum[i] } else { below[i] };
-            above[i] = if off == N::ONE { sum[i] } else { above[i] };
-            let near = (off == N::ZERO) | (off == N::ONE) | (off == N::MINUS_ONE);
-            second[i] = if near { second[i] } else { second[i].min(sum[i]) };
+            let (is_below, is_above) = (mask(off == N::MINUS_ONE), mask(off == N::ONE));
+            below[i] |= sum[i] & is_below;
+            above[i] |= sum[i] & is_above;
+            second[i] = second[i].min(sum[i] | is_below | is_above | mask(off == N::ZERO));
         }
     }
     let margin = 100 - u16::from(uniqueness_percent.min(100));
