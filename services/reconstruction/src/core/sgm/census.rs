@@ -4,6 +4,8 @@
 //! The bits of a pixel are kept as bytes, each in a plane of its own, so that 64 rows are compared by one exclusive-or and one
 //! population count for each plane.
 
+use std::ops::Range;
+
 use super::View;
 use super::lanes::{LANES, Lanes, load};
 
@@ -91,25 +93,37 @@ impl Transposed {
         }
     }
 
-    /// The census of all columns, in `BYTES` planes.
+    /// The census of these columns, in `BYTES` planes; beyond the edges the edge goes on.
     #[inline(always)]
-    pub(super) fn census<const BYTES: usize>(&self, census: Census, to: &mut Vec<[Lanes; BYTES]>) {
-        let columns = (self.bytes.len() / COLUMN).saturating_sub(2 * REACH);
-        to.resize(columns, [[0; LANES]; BYTES]);
-        for (x, planes) in to.iter_mut().enumerate() {
-            for (byte, plane) in planes.iter_mut().enumerate() {
-                let mut bits = [0; LANES];
-                for bit in 0..8 {
-                    if let Some((a, b)) = census.pair(8 * byte + bit) {
-                        let (a, b) = (self.at(x, a), self.at(x, b));
-                        for i in 0..LANES {
-                            bits[i] |= u8::from(b[i] > a[i]) << bit;
-                        }
+    pub(super) fn census<const BYTES: usize>(&self, census: Census, columns: Range<isize>, to: &mut Vec<[Lanes; BYTES]>) {
+        let last = (self.bytes.len() / COLUMN) as isize - 2 * REACH as isize - 1;
+        to.clear();
+        let mut before = None;
+        for column in columns {
+            let x = column.clamp(0, last) as usize;
+            let planes = match (before, to.last()) {
+                (Some(same), Some(planes)) if same == x => *planes,
+                _ => self.planes(census, x),
+            };
+            before = Some(x);
+            to.push(planes);
+        }
+    }
+
+    #[inline(always)]
+    fn planes<const BYTES: usize>(&self, census: Census, x: usize) -> [Lanes; BYTES] {
+        let mut planes = [[0; LANES]; BYTES];
+        for (byte, plane) in planes.iter_mut().enumerate() {
+            for bit in 0..8 {
+                if let Some((a, b)) = census.pair(8 * byte + bit) {
+                    let (a, b) = (self.at(x, a), self.at(x, b));
+                    for i in 0..LANES {
+                        plane[i] |= u8::from(b[i] > a[i]) << bit;
                     }
                 }
-                *plane = bits;
             }
         }
+        planes
     }
 
     /// The 64 pixels at (dx, dy) from column `x`.

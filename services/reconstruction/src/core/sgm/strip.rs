@@ -6,7 +6,7 @@
 //! third more arithmetic in place of main memory's bandwidth, and needs a few MB whatever the picture.
 
 use super::View;
-use super::agree::left_right;
+use super::agree::Owners;
 use super::census::{Census, Transposed};
 use super::choose::{Number, choose};
 use super::lanes::{LANES, Lanes};
@@ -49,7 +49,7 @@ pub(super) struct Workspace {
     two: Fronts<2>,
     costs: Vec<Lanes>,
     sums: Vec<Lanes>,
-    pub(super) right_row: Vec<(u8, i16)>,
+    owners: Owners,
 }
 
 #[derive(Debug, Default)]
@@ -93,17 +93,18 @@ fn with_census<const BYTES: usize>(
     workspace.left.fill(job.left, job.first_row);
     workspace.right.fill(job.right, job.first_row);
     let mut planes = std::mem::take(planes_of(workspace));
-    workspace.left.census(job.settings.census, &mut planes.left);
-    workspace.right.census(job.settings.census, &mut planes.right);
-    let columns =
-        Columns { left: &planes.left, right: &planes.right, min_px: job.min_px as isize, count: job.count };
+    let width = job.left.width as isize;
+    let (least, most) = (job.min_px as isize, job.min_px as isize + job.count as isize - 1);
+    workspace.left.census(job.settings.census, 0..width, &mut planes.left);
+    workspace.right.census(job.settings.census, -most..width - least, &mut planes.right);
+    let columns = Columns { left: &planes.left, right: &planes.right, count: job.count };
     let Workspace { three, two, costs, sums, .. } = workspace;
     match job.settings.paths {
         Paths::Four => sweep::<BYTES, 2>(job, &columns, two, (costs, sums), &mut output),
         Paths::Eight => sweep::<BYTES, 3>(job, &columns, three, (costs, sums), &mut output),
     }
     *planes_of(workspace) = planes;
-    left_right(job, &mut workspace.right_row, output);
+    workspace.owners.left_right(job, output);
 }
 
 #[inline(always)]
@@ -190,6 +191,6 @@ impl Workspace {
             + (self.costs.capacity() + self.sums.capacity()) * LANES
             + self.left.memory_bytes()
             + self.right.memory_bytes()
-            + self.right_row.capacity() * size_of::<(u8, i16)>()
+            + self.owners.memory_bytes()
     }
 }

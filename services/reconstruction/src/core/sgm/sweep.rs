@@ -6,6 +6,8 @@
 //! from below), one to the left those from the right. All of them step from one column to the next, so that the rows of a column
 //! do not depend on each other and 64 of them are worked on at once.
 
+use std::cell::Cell;
+
 use super::census::hamming;
 use super::lanes::{LANES, Lanes, all, load, store};
 
@@ -46,7 +48,9 @@ impl Front {
     /// Paths that have not begun.
     pub(super) fn reset(&mut self, count: usize) {
         self.bytes.clear();
-        self.bytes.resize((count + 2) * LANES, 0);
+        self.bytes.resize((count + 1) * LANES, 0);
+        // Beyond the last disparity nothing is cheap.
+        self.bytes.resize((count + 2) * LANES, u8::MAX);
         self.least.clear();
         self.least.resize(3 * LANES, 0);
     }
@@ -75,22 +79,15 @@ pub(super) const COMPLETE: u8 = 2;
 pub(super) struct Columns<'a, const BYTES: usize> {
     /// Census of the left picture, all columns.
     pub(super) left: &'a [[Lanes; BYTES]],
-    /// Census of the right picture.
+    /// Census of the right picture, from the column that the leftmost pixel sees at the largest disparity: those of column `x` are
+    /// `x .. x + count`, largest disparity first.
     pub(super) right: &'a [[Lanes; BYTES]],
-    /// Least disparity, pixels.
-    pub(super) min_px: isize,
     /// How many disparities.
     pub(super) count: usize,
 }
 
-impl<const BYTES: usize> Columns<'_, BYTES> {
-    /// Census of the right picture at a disparity from left column `x`; beyond its edges the edge goes on.
-    #[inline(always)]
-    fn opposite(&self, x: usize, disparity: usize) -> &[Lanes; BYTES] {
-        let last = self.right.len() - 1;
-        &self.right[(x as isize - self.min_px - disparity as isize).clamp(0, last as isize) as usize]
-    }
-}
+/// Bytes that are read in one place and written in another, in the order in which this is right.
+type Row = [Cell<u8>; LANES];
 
 /// Takes all paths of a sweep to column `x`. `costs` and `sums` have one entry a disparity (see [`BEGIN`], [`COMPLETE`]).
 #[inline(always)]
@@ -104,12 +101,11 @@ pub(super) fn step<const BYTES: usize, const PATHS: usize, const MODE: u8>(
 ) {
     let slopes = slopes::<PATHS>();
     let Penalties { p1, p2 } = penalties;
-    let left = columns.left[x];
     let count = columns.count;
+    let (left, right) = (&columns.left[x], &columns.right[x..x + count]);
     let (costs, sums) = if MODE == CARRY { (costs, sums) } else { (&mut costs[..count], &mut sums[..count]) };
     // Of each path: L(q, d − 1) + P1, L(q, d), min L(q, ·), that + P2, and the least of the new column.
     let mut below = [all(u8::MAX); PATHS];
-    let mut here: [Lanes; PATHS] = std::array::from_fn(|p| load(&fronts[p].bytes, LANES));
     let before: [Lanes; PATHS] = std::array::from_fn(|p| load(&fronts[p].least, LANES));
     let mut jump = before;
     let mut least = [all(u8::MAX); PATHS];
@@ -118,36 +114,53 @@ pub(super) fn step<const BYTES: usize, const PATHS: usize, const MODE: u8>(
             jump[p][i] = before[p][i].saturating_add(p2);
         }
     }
-    for d in 0..count {
-        let cost = if MODE == COMPLETE { costs[d] } else { hamming(&left, columns.opposite(x, d)) };
-        let mut sum = if MODE == COMPLETE { sums[d] } else { [0; LANES] };
-        for p in 0..PATHS {
-            let row = (d + 1) * LANES;
-            let above = if d + 1 < count { load(&fronts[p].bytes, row + LANES) } else { all(u8::MAX) };
-            let mut to = [0; LANES];
-            for i in 0..LANES {
-                let beside = below[p][i].min(above[i].saturating_add(p1));
-                let value = here[p][i].min(beside).min(jump[p][i]).wrapping_sub(before[p][i]).wrapping_add(cost[i]);
-                least[p][i] = least[p][i].min(value);
-                sum[i] = sum[i].saturating_add(value);
-                below[p][i] = here[p][i].saturating_add(p1);
-                to[i] = value;
+    {
+        let cells = fronts.each_mut().map(|front| Cell::from_mut(&mut front.bytes[..]).as_slice_of_cells());
+        let read: [&[Row]; PATHS] = std::array::from_fn(|p| &cells[p][LANES..].as_chunks().0[..=count]);
+        let write: [&[Row]; PATHS] =
+            std::array::from_fn(|p| &cells[p][LANES.wrapping_add_signed(slopes[p])..].as_chunks().0[..count]);
+        let mut here: [Lanes; PATHS] = std::array::from_fn(|p| get(&read[p][0]));
+        for d in 0..count {
+            let cost = if MODE == COMPLETE { costs[d] } else { hamming(left, &right[count - 1 - d]) };
+            let mut sum = if MODE == COMPLETE { sums[d] } else { [0; LANES] };
+            for p in 0..PATHS {
+                let above = get(&read[p][d + 1]);
+                let mut to = [0; LANES];
+                for i in 0..LANES {
+                    let beside = below[p][i].min(above[i].saturating_add(p1));
+                    let value = here[p][i].min(beside).min(jump[p][i]).wrapping_sub(before[p][i]).wrapping_add(cost[i]);
+                    least[p][i] = least[p][i].min(value);
+                    sum[i] = sum[i].saturating_add(value);
+                    below[p][i] = here[p][i].saturating_add(p1);
+                    to[i] = value;
+                }
+                leave(&mut to, slopes[p]);
+                for i in 0..LANES {
+                    write[p][d][i].set(to[i]);
+                }
+                here[p] = above;
             }
-            leave(&mut to, slopes[p]);
-            store(&mut fronts[p].bytes, row.wrapping_add_signed(slopes[p]), &to);
-            here[p] = above;
-        }
-        if MODE == BEGIN {
-            costs[d] = cost;
-        }
-        if MODE != CARRY {
-            sums[d] = sum;
+            if MODE == BEGIN {
+                costs[d] = cost;
+            }
+            if MODE != CARRY {
+                sums[d] = sum;
+            }
         }
     }
     for p in 0..PATHS {
         leave(&mut least[p], slopes[p]);
         store(&mut fronts[p].least, LANES.wrapping_add_signed(slopes[p]), &least[p]);
     }
+}
+
+#[inline(always)]
+fn get(row: &Row) -> Lanes {
+    let mut lanes = [0; LANES];
+    for i in 0..LANES {
+        lanes[i] = row[i].get();
+    }
+    lanes
 }
 
 /// The path that leaves the strip is forgotten: what is shifted out must be the zero of a path that enters.
