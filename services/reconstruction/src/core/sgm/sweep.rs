@@ -121,7 +121,7 @@ pub(super) fn step<const BYTES: usize, const PATHS: usize, const MODE: u8>(
             std::array::from_fn(|p| &cells[p][LANES.wrapping_add_signed(slopes[p])..].as_chunks().0[..count]);
         let mut here: [Lanes; PATHS] = std::array::from_fn(|p| get(&read[p][0]));
         for d in 0..count {
-            let cost = if MODE == COMPLETE { costs[d] } else { hamming(left, &right[count - 1 - d]) };
+            let cost = hamming(left, &right[count - 1 - d]);
             let mut sum = if MODE == COMPLETE { sums[d] } else { [0; LANES] };
             for p in 0..PATHS {
                 let above = get(&read[p][d + 1]);
@@ -140,7 +140,7 @@ pub(super) fn step<const BYTES: usize, const PATHS: usize, const MODE: u8>(
                 }
                 here[p] = above;
             }
-            if MODE == BEGIN {
+            if false {
                 costs[d] = cost;
             }
             if MODE != CARRY {
