@@ -2,8 +2,8 @@
 //!
 //! A sweep needs the whole width before the sweep back may begin, and a strip's path costs (`width × count × 64` bytes) are far
 //! larger than a cache. So the first sweep only leaves checkpoints, one each few columns; on the way back, a block of columns
-//! after the other is swept again from its checkpoint, this time keeping costs and sums, and completed in the cache. That is a
-//! third more arithmetic in place of main memory's bandwidth, and needs a few MB whatever the picture.
+//! after the other is swept again from its checkpoint, this time keeping the sums, and completed in the cache. That is half
+//! as much arithmetic again in place of main memory's bandwidth, and needs a few MB whatever the picture.
 
 use super::View;
 use super::agree::Owners;
@@ -13,7 +13,7 @@ use super::lanes::{LANES, Lanes};
 use super::sweep::{BEGIN, CARRY, COMPLETE, Columns, Front, Penalties, step};
 use super::{Paths, Settings};
 
-/// Bytes that the costs of a block may take: with as many of sums, a quarter or so of a core's second-level cache.
+/// Bytes that the sums of a block may take: what a core's second-level cache holds beside everything else.
 const BLOCK_BYTES: usize = 1 << 18;
 
 /// A strip to be matched.
@@ -45,9 +45,8 @@ pub(super) struct Workspace {
     five: Planes<3>,
     nine: Planes<4>,
     seven: Planes<6>,
-    three: Fronts<3>,
+    four: Fronts<4>,
     two: Fronts<2>,
-    costs: Vec<Lanes>,
     sums: Vec<Lanes>,
     owners: Owners,
 }
@@ -98,10 +97,10 @@ fn with_census<const BYTES: usize>(
     workspace.left.census(job.settings.census, 0..width, &mut planes.left);
     workspace.right.census(job.settings.census, -most..width - least, &mut planes.right);
     let columns = Columns { left: &planes.left, right: &planes.right, count: job.count };
-    let Workspace { three, two, costs, sums, .. } = workspace;
+    let Workspace { four, two, sums, .. } = workspace;
     match job.settings.paths {
-        Paths::Four => sweep::<BYTES, 2>(job, &columns, two, (costs, sums), &mut output),
-        Paths::Eight => sweep::<BYTES, 3>(job, &columns, three, (costs, sums), &mut output),
+        Paths::Four => sweep::<BYTES, 2>(job, &columns, two, sums, &mut output),
+        Paths::Eight => sweep::<BYTES, 4>(job, &columns, four, sums, &mut output),
     }
     *planes_of(workspace) = planes;
     workspace.owners.left_right(job, output);
@@ -112,13 +111,12 @@ fn sweep<const BYTES: usize, const PATHS: usize>(
     job: &Job<'_>,
     columns: &Columns<'_, BYTES>,
     fronts: &mut Fronts<PATHS>,
-    (costs, sums): (&mut Vec<Lanes>, &mut Vec<Lanes>),
+    sums: &mut Vec<Lanes>,
     output: &mut Output<'_>,
 ) {
     let (width, count) = (job.left.width, job.count);
     let penalties = Penalties { p1: job.settings.p1, p2: job.settings.p2 };
     let block = (BLOCK_BYTES / (count * LANES)).clamp(1, width);
-    costs.resize(block * count, [0; LANES]);
     sums.resize(block * count, [0; LANES]);
     let Fronts { checkpoints, now } = fronts;
     checkpoints.resize_with(width.div_ceil(block), Checkpoint::default);
@@ -131,7 +129,7 @@ fn sweep<const BYTES: usize, const PATHS: usize>(
         // Nothing follows the last one.
         if (number + 1) * block < width {
             for x in number * block..(number + 1) * block {
-                step::<BYTES, PATHS, CARRY>(columns, x, penalties, &mut now.0, &mut [], &mut []);
+                step::<BYTES, PATHS, CARRY>(columns, x, penalties, &mut now.0, &mut []);
             }
         }
     }
@@ -141,13 +139,13 @@ fn sweep<const BYTES: usize, const PATHS: usize>(
         let last = (first + block).min(width);
         for x in first..last {
             let at = (x - first) * count;
-            let (costs, sums) = (&mut costs[at..at + count], &mut sums[at..at + count]);
-            step::<BYTES, PATHS, BEGIN>(columns, x, penalties, &mut checkpoint.0, costs, sums);
+            let sums = &mut sums[at..at + count];
+            step::<BYTES, PATHS, BEGIN>(columns, x, penalties, &mut checkpoint.0, sums);
         }
         for x in (first..last).rev() {
             let at = (x - first) * count;
-            let (costs, sums) = (&mut costs[at..at + count], &mut sums[at..at + count]);
-            step::<BYTES, PATHS, COMPLETE>(columns, x, penalties, &mut now.0, costs, sums);
+            let sums = &mut sums[at..at + count];
+            step::<BYTES, PATHS, COMPLETE>(columns, x, penalties, &mut now.0, sums);
             if count <= 1 << 8 {
                 write::<u8>(job, x, sums, output);
             } else {
@@ -187,8 +185,8 @@ impl Workspace {
             + planes(&self.nine)
             + planes(&self.seven)
             + fronts(&self.two)
-            + fronts(&self.three)
-            + (self.costs.capacity() + self.sums.capacity()) * LANES
+            + fronts(&self.four)
+            + self.sums.capacity() * LANES
             + self.left.memory_bytes()
             + self.right.memory_bytes()
             + self.owners.memory_bytes()

@@ -20,14 +20,15 @@ pub(super) struct Penalties {
     pub(super) p2: u8,
 }
 
-/// Along which of the paths that a sweep can carry: how many rows the next pixel lies further down.
-pub(super) const fn slopes<const PATHS: usize>() -> [isize; PATHS] {
+/// How many rows further down the next column's pixel of each path lies: level, both diagonals (the second of which only eight
+/// paths have), one steep. A sweep back walks the same lines the other way round.
+const fn slopes<const PATHS: usize>(back: bool) -> [isize; PATHS] {
+    const SLOPES: [isize; 4] = [0, 1, -1, 2];
     let mut slopes = [0; PATHS];
-    let all = if PATHS == 2 { [1, -1, 0] } else { [0, 1, -1] };
-    let mut i = 0;
-    while i < PATHS {
-        slopes[i] = all[i];
-        i += 1;
+    let mut path = 0;
+    while path < PATHS {
+        slopes[path] = if back { -SLOPES[path] } else { SLOPES[path] };
+        path += 1;
     }
     slopes
 }
@@ -69,9 +70,9 @@ impl Front {
 
 /// Only carry the paths on.
 pub(super) const CARRY: u8 = 0;
-/// Carry, and begin the sums: costs and sums are written.
+/// Carry, and begin the sums.
 pub(super) const BEGIN: u8 = 1;
-/// Carry, and complete the sums: costs are read, sums are added to.
+/// Carry, and complete the sums, on the way back.
 pub(super) const COMPLETE: u8 = 2;
 
 /// The columns that are compared.
@@ -89,21 +90,20 @@ pub(super) struct Columns<'a, const BYTES: usize> {
 /// Bytes that are read in one place and written in another, in the order in which this is right.
 type Row = [Cell<u8>; LANES];
 
-/// Takes all paths of a sweep to column `x`. `costs` and `sums` have one entry a disparity (see [`BEGIN`], [`COMPLETE`]).
+/// Takes all paths of a sweep to column `x`. `sums` have one entry a disparity, but for [`CARRY`].
 #[inline(always)]
 pub(super) fn step<const BYTES: usize, const PATHS: usize, const MODE: u8>(
     columns: &Columns<'_, BYTES>,
     x: usize,
     penalties: Penalties,
     fronts: &mut [Front; PATHS],
-    costs: &mut [Lanes],
     sums: &mut [Lanes],
 ) {
-    let slopes = slopes::<PATHS>();
+    let slopes = const { slopes::<PATHS>(MODE == COMPLETE) };
     let Penalties { p1, p2 } = penalties;
     let count = columns.count;
     let (left, right) = (&columns.left[x], &columns.right[x..x + count]);
-    let (costs, sums) = if MODE == CARRY { (costs, sums) } else { (&mut costs[..count], &mut sums[..count]) };
+    let sums = if MODE == CARRY { sums } else { &mut sums[..count] };
     // Of each path: L(q, d − 1) + P1, L(q, d), min L(q, ·), that + P2, and the least of the new column.
     let mut below = [all(u8::MAX); PATHS];
     let before: [Lanes; PATHS] = std::array::from_fn(|p| load(&fronts[p].least, LANES));
@@ -121,6 +121,7 @@ pub(super) fn step<const BYTES: usize, const PATHS: usize, const MODE: u8>(
             std::array::from_fn(|p| &cells[p][LANES.wrapping_add_signed(slopes[p])..].as_chunks().0[..count]);
         let mut here: [Lanes; PATHS] = std::array::from_fn(|p| get(&read[p][0]));
         for d in 0..count {
+            // Computed for each sweep: a byte from the second-level cache takes longer.
             let cost = hamming(left, &right[count - 1 - d]);
             let mut sum = if MODE == COMPLETE { sums[d] } else { [0; LANES] };
             for p in 0..PATHS {
@@ -139,9 +140,6 @@ pub(super) fn step<const BYTES: usize, const PATHS: usize, const MODE: u8>(
                     write[p][d][i].set(to[i]);
                 }
                 here[p] = above;
-            }
-            if false {
-                costs[d] = cost;
             }
             if MODE != CARRY {
                 sums[d] = sum;
@@ -167,7 +165,7 @@ fn get(row: &Row) -> Lanes {
 #[inline(always)]
 fn leave(lanes: &mut Lanes, slope: isize) {
     for i in 0..LANES {
-        let leaves = (slope > 0 && i == LANES - 1) || (slope < 0 && i == 0);
+        let leaves = (i as isize + slope) < 0 || (i as isize + slope) >= LANES as isize;
         lanes[i] = if leaves { 0 } else { lanes[i] };
     }
 }
