@@ -10,7 +10,7 @@ use super::agree::Owners;
 use super::census::{Census, Transposed};
 use super::choose::{Number, choose};
 use super::lanes::{LANES, Lanes};
-use super::sweep::{BEGIN, CARRY, COMPLETE, Columns, Front, Penalties, step};
+use super::sweep::{ADD, BEGIN, CARRY, Columns, Front, PATHS, Penalties, step};
 use super::{Paths, Settings};
 
 /// Bytes that the sums of a block may take: what a core's second-level cache holds beside everything else.
@@ -45,8 +45,8 @@ pub(super) struct Workspace {
     five: Planes<3>,
     nine: Planes<4>,
     seven: Planes<6>,
-    four: Fronts<4>,
-    two: Fronts<2>,
+    /// Of the first four paths, and of the second.
+    fronts: [Fronts; 2],
     sums: Vec<Lanes>,
     owners: Owners,
 }
@@ -58,18 +58,9 @@ struct Planes<const BYTES: usize> {
 }
 
 #[derive(Debug, Default)]
-struct Fronts<const PATHS: usize> {
-    checkpoints: Vec<Checkpoint<PATHS>>,
-    now: Checkpoint<PATHS>,
-}
-
-#[derive(Debug, Clone)]
-struct Checkpoint<const PATHS: usize>([Front; PATHS]);
-
-impl<const PATHS: usize> Default for Checkpoint<PATHS> {
-    fn default() -> Self {
-        Self(std::array::from_fn(|_| Front::default()))
-    }
+struct Fronts {
+    checkpoints: Vec<[Front; PATHS]>,
+    now: [Front; PATHS],
 }
 
 /// Matches a strip.
@@ -97,20 +88,20 @@ fn with_census<const BYTES: usize>(
     workspace.left.census(job.settings.census, 0..width, &mut planes.left);
     workspace.right.census(job.settings.census, -most..width - least, &mut planes.right);
     let columns = Columns { left: &planes.left, right: &planes.right, count: job.count };
-    let Workspace { four, two, sums, .. } = workspace;
+    let Workspace { fronts, sums, .. } = workspace;
     match job.settings.paths {
-        Paths::Four => sweep::<BYTES, 2>(job, &columns, two, sums, &mut output),
-        Paths::Eight => sweep::<BYTES, 4>(job, &columns, four, sums, &mut output),
+        Paths::Four => sweep::<BYTES, 1>(job, &columns, fronts, sums, &mut output),
+        Paths::Eight => sweep::<BYTES, 2>(job, &columns, fronts, sums, &mut output),
     }
     *planes_of(workspace) = planes;
     workspace.owners.left_right(job, output);
 }
 
 #[inline(always)]
-fn sweep<const BYTES: usize, const PATHS: usize>(
+fn sweep<const BYTES: usize, const GROUPS: usize>(
     job: &Job<'_>,
     columns: &Columns<'_, BYTES>,
-    fronts: &mut Fronts<PATHS>,
+    [first_group, second_group]: &mut [Fronts; 2],
     sums: &mut Vec<Lanes>,
     output: &mut Output<'_>,
 ) {
@@ -118,34 +109,26 @@ fn sweep<const BYTES: usize, const PATHS: usize>(
     let penalties = Penalties { p1: job.settings.p1, p2: job.settings.p2 };
     let block = (BLOCK_BYTES / (count * LANES)).clamp(1, width);
     sums.resize(block * count, [0; LANES]);
-    let Fronts { checkpoints, now } = fronts;
-    checkpoints.resize_with(width.div_ceil(block), Checkpoint::default);
-
-    now.0.iter_mut().for_each(|front| front.reset(count));
-    for (number, checkpoint) in checkpoints.iter_mut().enumerate() {
-        for (to, from) in checkpoint.0.iter_mut().zip(&now.0) {
-            to.copy_from(from);
-        }
-        // Nothing follows the last one.
-        if (number + 1) * block < width {
-            for x in number * block..(number + 1) * block {
-                step::<BYTES, PATHS, CARRY>(columns, x, penalties, &mut now.0, &mut []);
-            }
-        }
+    carry::<BYTES, 0>(columns, penalties, first_group, block);
+    if GROUPS > 1 {
+        carry::<BYTES, 1>(columns, penalties, second_group, block);
     }
-    now.0.iter_mut().for_each(|front| front.reset(count));
-    for (number, checkpoint) in checkpoints.iter_mut().enumerate().rev() {
+    for number in (0..width.div_ceil(block)).rev() {
         let first = number * block;
         let last = (first + block).min(width);
         for x in first..last {
-            let at = (x - first) * count;
-            let sums = &mut sums[at..at + count];
-            step::<BYTES, PATHS, BEGIN>(columns, x, penalties, &mut checkpoint.0, sums);
+            let sums = &mut sums[(x - first) * count..][..count];
+            step::<BYTES, BEGIN, 0, false>(columns, x, penalties, &mut first_group.checkpoints[number], sums);
+            if GROUPS > 1 {
+                step::<BYTES, ADD, 1, false>(columns, x, penalties, &mut second_group.checkpoints[number], sums);
+            }
         }
         for x in (first..last).rev() {
-            let at = (x - first) * count;
-            let sums = &mut sums[at..at + count];
-            step::<BYTES, PATHS, COMPLETE>(columns, x, penalties, &mut now.0, sums);
+            let sums = &mut sums[(x - first) * count..][..count];
+            step::<BYTES, ADD, 0, true>(columns, x, penalties, &mut first_group.now, sums);
+            if GROUPS > 1 {
+                step::<BYTES, ADD, 1, true>(columns, x, penalties, &mut second_group.now, sums);
+            }
             if count <= 1 << 8 {
                 write::<u8>(job, x, sums, output);
             } else {
@@ -153,6 +136,31 @@ fn sweep<const BYTES: usize, const PATHS: usize>(
             }
         }
     }
+}
+
+/// The first sweep of a group: leaves a checkpoint before each block, and paths that have not begun for the sweep back.
+#[inline(always)]
+fn carry<const BYTES: usize, const GROUP: usize>(
+    columns: &Columns<'_, BYTES>,
+    penalties: Penalties,
+    Fronts { checkpoints, now }: &mut Fronts,
+    block: usize,
+) {
+    let width = columns.left.len();
+    checkpoints.resize_with(width.div_ceil(block), Default::default);
+    now.iter_mut().for_each(|front| front.reset(columns.count));
+    for (number, checkpoint) in checkpoints.iter_mut().enumerate() {
+        for (to, from) in checkpoint.iter_mut().zip(now.iter()) {
+            to.copy_from(from);
+        }
+        // Nothing follows the last one.
+        if (number + 1) * block < width {
+            for x in number * block..(number + 1) * block {
+                step::<BYTES, CARRY, GROUP, false>(columns, x, penalties, now, &mut []);
+            }
+        }
+    }
+    now.iter_mut().for_each(|front| front.reset(columns.count));
 }
 
 /// Chooses for column `x` and writes what is kept.
@@ -177,15 +185,11 @@ impl Workspace {
         fn planes<const BYTES: usize>(planes: &Planes<BYTES>) -> usize {
             (planes.left.capacity() + planes.right.capacity()) * BYTES * LANES
         }
-        fn fronts<const PATHS: usize>(fronts: &Fronts<PATHS>) -> usize {
-            let all = fronts.checkpoints.iter().chain(std::iter::once(&fronts.now));
-            all.flat_map(|checkpoint| &checkpoint.0).map(Front::memory_bytes).sum()
-        }
+        let fronts = self.fronts.iter().flat_map(|fronts| fronts.checkpoints.iter().chain([&fronts.now])).flatten();
         planes(&self.five)
             + planes(&self.nine)
             + planes(&self.seven)
-            + fronts(&self.two)
-            + fronts(&self.four)
+            + fronts.map(Front::memory_bytes).sum::<usize>()
             + self.sums.capacity() * LANES
             + self.left.memory_bytes()
             + self.right.memory_bytes()

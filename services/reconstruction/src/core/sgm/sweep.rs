@@ -20,17 +20,14 @@ pub(super) struct Penalties {
     pub(super) p2: u8,
 }
 
-/// How many rows further down the next column's pixel of each path lies: level, both diagonals (the second of which only eight
-/// paths have), one steep. A sweep back walks the same lines the other way round.
-const fn slopes<const PATHS: usize>(back: bool) -> [isize; PATHS] {
-    const SLOPES: [isize; 4] = [0, 1, -1, 2];
-    let mut slopes = [0; PATHS];
-    let mut path = 0;
-    while path < PATHS {
-        slopes[path] = if back { -SLOPES[path] } else { SLOPES[path] };
-        path += 1;
-    }
-    slopes
+/// Paths that are carried together: as many as the registers hold.
+pub(super) const PATHS: usize = 2;
+
+/// How many rows further down the next column's pixel of each path lies: level and the falling diagonal; for eight paths also the
+/// rising diagonal and a steep line. A sweep back walks the same lines the other way round.
+const fn slopes(group: usize, back: bool) -> [isize; PATHS] {
+    let [a, b] = if group == 0 { [0, 1] } else { [-1, 2] };
+    if back { [-a, -b] } else { [a, b] }
 }
 
 /// Path costs of the column before, in place of which those of the next are written.
@@ -72,8 +69,8 @@ impl Front {
 pub(super) const CARRY: u8 = 0;
 /// Carry, and begin the sums.
 pub(super) const BEGIN: u8 = 1;
-/// Carry, and complete the sums, on the way back.
-pub(super) const COMPLETE: u8 = 2;
+/// Carry, and add to the sums.
+pub(super) const ADD: u8 = 2;
 
 /// The columns that are compared.
 #[derive(Clone, Copy)]
@@ -90,16 +87,16 @@ pub(super) struct Columns<'a, const BYTES: usize> {
 /// Bytes that are read in one place and written in another, in the order in which this is right.
 type Row = [Cell<u8>; LANES];
 
-/// Takes all paths of a sweep to column `x`. `sums` have one entry a disparity, but for [`CARRY`].
+/// Takes a group of paths to column `x`, to the left where `BACK`. `sums` have one entry a disparity, but for [`CARRY`].
 #[inline(always)]
-pub(super) fn step<const BYTES: usize, const PATHS: usize, const MODE: u8>(
+pub(super) fn step<const BYTES: usize, const MODE: u8, const GROUP: usize, const BACK: bool>(
     columns: &Columns<'_, BYTES>,
     x: usize,
     penalties: Penalties,
     fronts: &mut [Front; PATHS],
     sums: &mut [Lanes],
 ) {
-    let slopes = const { slopes::<PATHS>(MODE == COMPLETE) };
+    let slopes = const { slopes(GROUP, BACK) };
     let Penalties { p1, p2 } = penalties;
     let count = columns.count;
     let (left, right) = (&columns.left[x], &columns.right[x..x + count]);
@@ -123,7 +120,7 @@ pub(super) fn step<const BYTES: usize, const PATHS: usize, const MODE: u8>(
         for d in 0..count {
             // Computed for each sweep: a byte from the second-level cache takes longer.
             let cost = hamming(left, &right[count - 1 - d]);
-            let mut sum = if MODE == COMPLETE { sums[d] } else { [0; LANES] };
+            let mut sum = if MODE == ADD { sums[d] } else { [0; LANES] };
             for p in 0..PATHS {
                 let above = get(&read[p][d + 1]);
                 let mut to = [0; LANES];
