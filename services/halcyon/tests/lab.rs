@@ -39,7 +39,10 @@ fn costs_rank_as_published() {
     let bad = |name: &str| found(&costs, &format!("off by more than 1 px, {name}"));
     assert!(bad("census") < bad("sad") && bad("rank") < bad("sad") && bad("sad") < bad("ssd"));
     let (_, left_right) = run("left-right");
-    assert!(found(&left_right, "off by more than 1 px, with the check") < found(&left_right, "off by more than 1 px, without the check"));
+    assert!(
+        found(&left_right, "off by more than 1 px, with the check")
+            < found(&left_right, "off by more than 1 px, without the check")
+    );
     assert!(found(&left_right, "matched, with the check") < found(&left_right, "matched, without the check"));
     let (_, paths) = run("paths");
     assert!(found(&paths, "off by more than 1 px, 8 paths") < bad("census"));
@@ -78,7 +81,10 @@ fn a_report_stands_alone() {
     write(folder.path(), &exhibits).unwrap();
     let html = std::fs::read_to_string(folder.path().join("index.html")).unwrap();
     assert!(html == page(&exhibits) && html.contains("<svg") && html.contains("data:image/png;base64,"));
-    assert!(!html.contains("http://") || html.matches("http://").count() == html.matches("http://www.w3.org").count(), "nothing is loaded");
+    assert!(
+        !html.contains("http://") || html.matches("http://").count() == html.matches("http://www.w3.org").count(),
+        "nothing is loaded"
+    );
     let cloud = std::fs::read(folder.path().join("film.ply")).unwrap();
     assert!(cloud.starts_with(b"ply\n"));
 }

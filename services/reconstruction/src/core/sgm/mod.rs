@@ -9,10 +9,14 @@ mod agree;
 mod census;
 mod choose;
 mod lanes;
+#[cfg(test)]
+mod oracle;
 mod simd;
 mod speckle;
 mod strip;
 mod sweep;
+#[cfg(test)]
+mod tests;
 
 use std::sync::{Mutex, PoisonError};
 
@@ -101,9 +105,7 @@ const DISPARITY_MAX: i32 = 1 << 14;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum SgmError {
     /// No picture, one too large, or fewer bytes than its rows need.
-    #[error(
-        "{bytes} bytes are no picture of {width}x{height} px with {stride} bytes a row (at most {SIDE_MAX} px a side)"
-    )]
+    #[error("{bytes} bytes are no picture of {width}x{height} px with {stride} bytes a row (at most {SIDE_MAX} px a side)")]
     View {
         /// Width.
         width: usize,
