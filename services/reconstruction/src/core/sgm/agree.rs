@@ -16,7 +16,7 @@ impl Owners {
     ///
     /// Without branches: which way they go is as random as the picture.
     #[inline(always)]
-    pub(super) fn left_right(&mut self, job: &Job<'_>, output: Output<'_>) {
+    pub(super) fn left_right(&mut self, job: &Job<'_>, output: &mut Output<'_>) {
         let Some(most) = job.settings.left_right_max_px.map(u32::from) else { return };
         let (width, min_px) = (job.left.width, job.min_px);
         self.matches.resize(width, (0, 0));

@@ -2,7 +2,7 @@
 
 //!
 //! A picture is cut into strips of 64 rows that overlap by a few; each is transposed, described by its census, and swept from left to
-//! right and back ([`sweep`], [`strip`]). Every strip is one task. What a strip's own rows cannot tell, paths do not carry further:
+//! right and back (`sweep`, `strip`). Every strip is one task. What a strip's own rows cannot tell, paths do not carry further:
 //! they begin at its edges.
 
 mod agree;
@@ -138,9 +138,10 @@ pub enum SgmError {
 
 /// Matches pictures; keeps its buffers between calls, so that nothing is allocated once they fit.
 ///
-/// Memory ([`Self::memory_bytes`]): each thread holds a strip's census (`(2 width + count) × 192` bytes), checkpoints
-/// (`width × count² / 64` bytes for four paths) and a block of sums (256 KB, or one column's if that is more), together 2 MB for 640 × 480 with
-/// 64 disparities and 5 MB for 1920 × 1080 with 128; all threads share a byte a pixel and the runs of the speck filter.
+/// Memory ([`Self::memory_bytes`]): each thread holds a strip's census (192 bytes a column of 64 rows, left and right), a checkpoint
+/// (128 bytes a disparity for four paths) before each block of columns, and a block of sums (256 KB, more only above 256
+/// disparities); all threads share a byte a pixel and the runs of the speck filter. Measured on the aloe pair with four paths: 1.4 MB for
+/// 640 × 480 with 64 disparities and 1.1 MB for each further thread, 8.7 MB for 1920 × 1080 with 128 and 3 MB for each further one.
 #[derive(Debug)]
 pub struct SemiGlobal {
     settings: Settings,

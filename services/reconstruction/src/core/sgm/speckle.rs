@@ -20,18 +20,15 @@ impl Specks {
         }
         self.runs.clear();
         self.spans.clear();
-        let (mut above, mut first_above) = (0..0, 0);
+        let mut above = 0..0;
         for (y, row) in disparity_px.chunks_exact(width).enumerate() {
             let first = self.spans.len();
             self.find_runs(row, (y * width) as u32, step_max_px);
-            let start = y * width;
             if y > 0 {
                 self.join(disparity_px, width, (above.clone(), first..self.spans.len()), step_max_px);
             }
             above = first..self.spans.len();
-            first_above = start;
         }
-        let _ = first_above;
         for run in 0..self.spans.len() {
             let root = self.root(run as u32);
             let (start, end) = self.spans[run];

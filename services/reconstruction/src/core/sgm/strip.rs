@@ -94,7 +94,7 @@ fn with_census<const BYTES: usize>(
         Paths::Eight => sweep::<BYTES, 2>(job, &columns, fronts, sums, &mut output),
     }
     *planes_of(workspace) = planes;
-    workspace.owners.left_right(job, output);
+    workspace.owners.left_right(job, &mut output);
 }
 
 #[inline(always)]
@@ -107,7 +107,8 @@ fn sweep<const BYTES: usize, const GROUPS: usize>(
 ) {
     let (width, count) = (job.left.width, job.count);
     let penalties = Penalties { p1: job.settings.p1, p2: job.settings.p2 };
-    let block = (BLOCK_BYTES / (count * LANES)).clamp(1, width);
+    // Not too few columns where there are many disparities: every block has a checkpoint.
+    let block = (BLOCK_BYTES / (count * LANES)).max(width.isqrt() / 2).clamp(1, width);
     sums.resize(block * count, [0; LANES]);
     carry::<BYTES, 0>(columns, penalties, first_group, block);
     if GROUPS > 1 {

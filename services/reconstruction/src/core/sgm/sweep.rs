@@ -161,8 +161,8 @@ fn get(row: &Row) -> Lanes {
 /// The path that leaves the strip is forgotten: what is shifted out must be the zero of a path that enters.
 #[inline(always)]
 fn leave(lanes: &mut Lanes, slope: isize) {
-    for i in 0..LANES {
+    for (i, lane) in lanes.iter_mut().enumerate() {
         let leaves = (i as isize + slope) < 0 || (i as isize + slope) >= LANES as isize;
-        lanes[i] = if leaves { 0 } else { lanes[i] };
+        *lane = if leaves { 0 } else { *lane };
     }
 }
