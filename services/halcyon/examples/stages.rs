@@ -40,8 +40,16 @@ fn main() {
                 times[2].push(spent(|| refiner.refine(l, r, &mut disparity, &mut sigma).unwrap()).1.wall_ms);
                 times[3].push(spent(|| chain.reconstruct(&pair).unwrap()).1.wall_ms);
             }
-            println!("{threads} threads, guided {}: rectify {:.2}, match {:.2}, refine {:.2}, all {:.2} ms; {} MiB", matcher.was_guided(),
-                median(times[0].iter().copied()), median(times[1].iter().copied()), median(times[2].iter().copied()), median(times[3].iter().copied()), chain.memory_bytes() >> 20);
-        }).unwrap();
+            println!(
+                "{threads} threads, guided {}: rectify {:.2}, match {:.2}, refine {:.2}, all {:.2} ms; {} MiB",
+                matcher.was_guided(),
+                median(times[0].iter().copied()),
+                median(times[1].iter().copied()),
+                median(times[2].iter().copied()),
+                median(times[3].iter().copied()),
+                chain.memory_bytes() >> 20
+            );
+        })
+        .unwrap();
     }
 }

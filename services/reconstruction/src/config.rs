@@ -13,7 +13,8 @@ use crate::core::reconstruct::Settings;
 pub struct Config {
     /// The rig whose pairs are reconstructed.
     pub rig: String,
-    /// Dense matching: `sgbm`, `sgbm-3way` (threaded, less memory), `sgbm-hh` (best, slow) or `bm` (fast, sparse).
+    /// Dense matching: `sgbm`, `sgbm-3way` (threaded, less memory), `sgbm-hh` (best, slow), `sgm` or `sgm8` (our own, fastest of
+    /// the dense ones) or `bm` (fast, sparse).
     pub engine: String,
     /// Window of the matcher, pixels, odd; 0 takes what suits the engine.
     pub block_px: u32,

@@ -24,7 +24,7 @@ pub(super) struct Args {
     /// Largest disparity to search, pixels
     #[arg(long, value_name = "PX", allow_negative_numbers = true)]
     max_disparity: f64,
-    /// For work bm, sgbm, sgbm-3way, sgbm-hh4 or sgbm-hh. For study the reference matcher: wta-COST (winner takes all) or
+    /// For work bm, sgbm, sgbm-3way, sgbm-hh4, sgbm-hh, sgm or sgm8. For study the reference matcher: wta-COST (winner takes all) or
     /// sgm-COST (semi-global), where COST is sad, ssd, ncc, rank, census or mi
     #[arg(long, default_value = "sgbm")]
     engine: String,

@@ -68,7 +68,7 @@ struct Pose {
 
 #[derive(Debug, clap::Args)]
 struct How {
-    /// bm, sgbm, sgbm-3way or sgbm-hh
+    /// bm, sgbm, sgbm-3way, sgbm-hh, sgm or sgm8
     #[arg(long, default_value = "sgbm")]
     engine: String,
     /// Cell of the elevation grid, metres; otherwise about ten pixels

@@ -20,6 +20,7 @@ mod resample;
 pub mod rig_budget;
 mod scatter;
 pub mod self_calibrate;
+pub mod sgm;
 pub mod show;
 pub mod study;
 pub mod tilt;

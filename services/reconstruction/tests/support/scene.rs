@@ -96,7 +96,7 @@ fn undistorted_ray(camera: &CameraIntrinsics, x_px: f64, y_px: f64) -> Vector3<f
 }
 
 /// Where a ray meets the water: (north, east). Fixed-point iteration on the height, which gentle slopes let converge.
-fn hit(centre_ned_m: &Vector3<f64>, ray: &Vector3<f64>, surface: Surface<'_>) -> (f64, f64) {
+pub(crate) fn hit(centre_ned_m: &Vector3<f64>, ray: &Vector3<f64>, surface: Surface<'_>) -> (f64, f64) {
     let mut height = 0.0;
     let (mut north, mut east) = (0.0, 0.0);
     for _ in 0..8 {
