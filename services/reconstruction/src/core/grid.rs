@@ -1,6 +1,7 @@
 //! From scattered points to a regular elevation grid: a robust, weighted mean for each cell, with its standard deviation.
 
 use halcyon_model::ElevationGrid;
+use rayon::prelude::*;
 
 /// More cells than any patch needs; a view of the horizon would ask for millions.
 const CELLS_MAX: usize = 1 << 18;
@@ -8,6 +9,11 @@ const CELLS_MAX: usize = 1 << 18;
 const OUTLIER_SIGMAS: f32 = 3.5;
 /// A cell seen less than this share of its area is not filled: its mean would belong to another place.
 const FILLED_MIN: f64 = 0.3;
+
+/// Points that are worth another thread.
+const POINTS_A_TASK: usize = 4096;
+/// South, north, west and east of no point.
+const NOWHERE: [f64; 4] = [f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY, f64::NEG_INFINITY];
 
 /// A point of the water surface in the local frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,7 +61,6 @@ pub struct Gridder {
     first_of_cell: Vec<u32>,
     cell_of_point: Vec<u32>,
     by_cell: Vec<(f32, f32)>,
-    scratch: Vec<f32>,
 }
 
 impl Gridder {
@@ -65,12 +70,14 @@ impl Gridder {
     /// # Errors
     /// [`GridError`] where the points span too much or no cell is filled.
     pub fn grid(&mut self, points: &[SurfacePoint], cell_m: f64, sampling: Sampling) -> Result<ElevationGrid, GridError> {
-        let mut south = f64::INFINITY;
-        let (mut north, mut west, mut east) = (-south, south, -south);
-        for point in points {
-            (south, north) = (south.min(point.north_m), north.max(point.north_m));
-            (west, east) = (west.min(point.east_m), east.max(point.east_m));
-        }
+        let extent = |points: &[SurfacePoint]| {
+            points.iter().fold(NOWHERE, |[south, north, west, east], point| {
+                let (n, e) = (point.north_m, point.east_m);
+                [south.min(n), north.max(n), west.min(e), east.max(e)]
+            })
+        };
+        let wider = |a: [f64; 4], b: [f64; 4]| [a[0].min(b[0]), a[1].max(b[1]), a[2].min(b[2]), a[3].max(b[3])];
+        let [south, north, west, east] = points.par_chunks(POINTS_A_TASK).map(extent).reduce(|| NOWHERE, wider);
         if points.is_empty() {
             return Err(GridError::Empty);
         }
@@ -92,19 +99,25 @@ impl Gridder {
         let mut sigma_m = vec![f32::NAN; rows * cols];
         let nominal = (cell_m / sampling.spacing_m).powi(2);
         let needed = ((nominal * FILLED_MIN) as usize).max(3);
-        let mut filled = 0;
-        for cell in 0..rows * cols {
-            let within = self.first_of_cell[cell] as usize..self.first_of_cell[cell + 1] as usize;
-            if within.len() < needed {
-                continue;
+        let (first_of_cell, by_cell) = (&self.first_of_cell, &self.by_cell);
+        let row_of_cells = |scratch: &mut Vec<f32>, (row, (elevation_m, sigma_m)): (usize, (&mut [f32], &mut [f32]))| {
+            let mut filled = 0_usize;
+            for (col, (elevation_m, sigma_m)) in elevation_m.iter_mut().zip(sigma_m).enumerate() {
+                let cell = row * cols + col;
+                let within = first_of_cell[cell] as usize..first_of_cell[cell + 1] as usize;
+                if within.len() < needed {
+                    continue;
+                }
+                let side_m = (within.len() as f64).sqrt() * sampling.spacing_m;
+                let independent = correlation(side_m, sampling.window_m) as f32;
+                let (mean, sigma) = robust_mean(&by_cell[within], scratch);
+                (*elevation_m, *sigma_m) = (mean, sigma * independent);
+                filled += 1;
             }
-            let side_m = (within.len() as f64).sqrt() * sampling.spacing_m;
-            let independent = correlation(side_m, sampling.window_m) as f32;
-            let (mean, sigma) = robust_mean(&self.by_cell[within], &mut self.scratch);
-            elevation_m[cell] = mean;
-            sigma_m[cell] = sigma * independent;
-            filled += 1;
-        }
+            filled
+        };
+        let rows_of_cells = elevation_m.par_chunks_mut(cols).zip(sigma_m.par_chunks_mut(cols)).enumerate();
+        let filled: usize = rows_of_cells.map_init(Vec::new, row_of_cells).sum();
         if filled == 0 {
             return Err(GridError::Empty);
         }
@@ -120,14 +133,13 @@ impl Gridder {
     }
 
     /// A counting sort: points of one cell become neighbours in `by_cell`.
-    fn sort_by_cell(&mut self, points: &[SurfacePoint], cells: usize, cell_of: impl Fn(&SurfacePoint) -> usize) {
+    fn sort_by_cell(&mut self, points: &[SurfacePoint], cells: usize, cell_of: impl Fn(&SurfacePoint) -> usize + Sync) {
         self.first_of_cell.clear();
         self.first_of_cell.resize(cells + 1, 0);
-        self.cell_of_point.clear();
-        for point in points {
-            let cell = cell_of(point);
-            self.cell_of_point.push(cell as u32);
-            self.first_of_cell[cell] += 1;
+        let cells_of_points = points.par_iter().with_min_len(POINTS_A_TASK).map(|point| cell_of(point) as u32);
+        cells_of_points.collect_into_vec(&mut self.cell_of_point);
+        for cell in &self.cell_of_point {
+            self.first_of_cell[*cell as usize] += 1;
         }
         // Counts become the end of each cell; filling from the back turns ends into starts.
         let mut end = 0;

@@ -11,6 +11,7 @@ use halcyon_model::Plane;
 use nalgebra::{Matrix3, Vector3};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
 
 use super::rectify::RectifiedRig;
 
@@ -18,6 +19,10 @@ use super::rectify::RectifiedRig;
 const HYPOTHESES: usize = 96;
 /// Points that a hypothesis is judged by.
 const JUDGES: usize = 512;
+/// Points that say where the middle of all is; the last word is that of every point that belongs.
+const SAMPLE: usize = 8192;
+/// Points that one task sums up. Fixed, so that rounding does not depend on how many threads there are.
+const CHUNK: usize = 8192;
 /// Points further from the plane than this many robust standard deviations are outliers. A Gaussian sea has crests of four.
 const OUTLIER_SIGMAS: f32 = 5.0;
 /// Rounds from the robust start to the plane of all that belongs to it.
@@ -70,9 +75,10 @@ pub fn fit(matches: &mut Vec<Match>, rig: &RectifiedRig, points_min: usize, seed
     let (mut plane_px, mut sigma_px) =
         least_median(matches, &judges, &mut random, &mut deviations).ok_or(PlaneError::NoPlane)?;
     let mut limit_px = OUTLIER_PX_MIN;
+    let sample: Vec<Match> = (0..SAMPLE.min(matches.len())).map(|_| matches[random.random_range(0..matches.len())]).collect();
     for _ in 0..ROUNDS {
         limit_px = (OUTLIER_SIGMAS * sigma_px).max(OUTLIER_PX_MIN);
-        plane_px = plane_px.refit(matches, limit_px).ok_or(PlaneError::NoPlane)?;
+        plane_px = plane_px.refit(&sample, limit_px).ok_or(PlaneError::NoPlane)?;
         let wider_px = median_deviation(&judges, &plane_px, &mut deviations) / MEDIAN_PER_SIGMA;
         if (wider_px - sigma_px).abs() <= 0.01 * sigma_px {
             break;
@@ -204,12 +210,20 @@ fn least_squares(matches: &[Match], rig: &RectifiedRig) -> Option<Plane> {
     let count = matches.len() as f64;
     // Sums about a nearby point: squares of depths would eat the digits that waves need.
     let origin = point(matches.first()?);
-    let (mut sum, mut squares) = (Vector3::zeros(), Matrix3::zeros());
-    for m in matches {
-        let offset = point(m) - origin;
-        sum += offset;
-        squares += offset * offset.transpose();
-    }
+    let sums: Vec<(Vector3<f64>, Matrix3<f64>)> = matches
+        .par_chunks(CHUNK)
+        .map(|matches| {
+            let (mut sum, mut squares) = (Vector3::zeros(), Matrix3::zeros());
+            for m in matches {
+                let offset = point(m) - origin;
+                sum += offset;
+                squares += offset * offset.transpose();
+            }
+            (sum, squares)
+        })
+        .collect();
+    let zero = (Vector3::zeros(), Matrix3::zeros());
+    let (sum, squares) = sums.into_iter().fold(zero, |all, one| (all.0 + one.0, all.1 + one.1));
     let mean = sum / count;
     let eigen = (squares / count - mean * mean.transpose()).symmetric_eigen();
     let smallest = eigen.eigenvalues.imin();

@@ -11,6 +11,7 @@ use opencv::core::Vector;
 use opencv::imgcodecs;
 use opencv::prelude::VectorToVec;
 use range::expected_range;
+use rayon::prelude::*;
 pub use world::WorldFromRectified;
 
 use super::disparity::{Disparity, colour};
@@ -71,8 +72,16 @@ const SIGMA_UNREFINED_PX: f32 = 0.2;
 pub(crate) const REFINE_ROUNDS: u32 = 2;
 /// A match that its own fit trusts less than this, pixels, is noise.
 const SIGMA_MAX_PX: f32 = 0.5;
+/// Points that one task works through.
+const POINTS_A_CHUNK: usize = 4096;
+/// Rows of matches that one task collects.
+const ROWS_A_BAND: usize = 32;
 /// With fewer of the pixels matched than this the search range was wrong, or there was nothing to see.
 const DENSITY_MIN: f64 = 0.25;
+
+fn finite(values: &[f32]) -> usize {
+    values.iter().filter(|value| value.is_finite()).count()
+}
 
 /// Why a pair became no patch.
 #[derive(Debug, thiserror::Error)]
@@ -120,7 +129,11 @@ pub struct Reconstructor {
     disparity: Disparity,
     sigma_px: Vec<f32>,
     matches: Vec<Match>,
+    /// The matches of so many rows each.
+    bands: Vec<Vec<Match>>,
     points: Vec<SurfacePoint>,
+    /// Mean of the points' horizontal positions: north, east, metres.
+    centre: Vector2<f64>,
     /// Mean depth of the last pair's points in the rectified left camera, metres.
     mean_depth_m: f64,
     last_pair: Option<(halcyon_model::Stamp, halcyon_model::RigId)>,
@@ -146,7 +159,9 @@ impl Reconstructor {
             disparity: Disparity::default(),
             sigma_px: Vec::new(),
             matches: Vec::new(),
+            bands: Vec::new(),
             points: Vec::new(),
+            centre: Vector2::zeros(),
             mean_depth_m: f64::NAN,
             last_pair: None,
             last_plane: None,
@@ -175,7 +190,7 @@ impl Reconstructor {
         self.spread_tilt(&mut grid, tilt.sigma);
         let level = match &pair.pose {
             Some(pose) => {
-                let centre = self.centre();
+                let centre = self.centre;
                 let lever_m = (centre - Vector2::new(pose.position_ned_m.x, pose.position_ned_m.y)).norm();
                 Some((level_m, pose.height_sigma_m.hypot(lever_m * pose.attitude_sigma_rad)))
             }
@@ -261,7 +276,7 @@ impl Reconstructor {
     pub fn memory_bytes(&self) -> usize {
         let floats = self.disparity.values_px.capacity() + self.sigma_px.capacity();
         size_of::<f32>() * floats
-            + size_of::<Match>() * self.matches.capacity()
+            + size_of::<Match>() * (2 * self.matches.capacity())
             + size_of::<SurfacePoint>() * self.points.capacity()
             + self.rectifier.as_ref().map_or(0, Rectifier::memory_bytes)
             + self.refiner.as_ref().map_or(0, Refiner::memory_bytes)
@@ -331,7 +346,7 @@ impl Reconstructor {
         self.matcher.guide(guide);
         self.matcher.compute(left, right, range, &mut self.disparity)?;
         let enough = (DENSITY_MIN * self.disparity.values_px.len() as f64) as usize;
-        let matched = self.disparity.values_px.iter().filter(|value| value.is_finite()).count();
+        let matched = self.disparity.values_px.par_chunks(POINTS_A_CHUNK).map(finite).sum::<usize>();
         if matched < enough {
             return Err(PlaneError::TooFewPoints { points: matched, needed: enough }.into());
         }
@@ -345,47 +360,54 @@ impl Reconstructor {
                 self.sigma_px.resize(self.disparity.values_px.len(), SIGMA_UNREFINED_PX);
             }
         }
-        self.matches.clear();
         let stride = self.settings.point_stride_px.max(1) as usize;
         // What a window saw beyond an edge was invented.
         let margin_px = self.window_px() / 2;
-        for y in (0..rig.height_px).step_by(stride) {
-            let row = self.disparity.row(y);
-            for x in (0..rig.width_px).step_by(stride) {
-                let disparity_px = row[x as usize];
-                let sigma_px = self.sigma_px[y as usize * rig.width_px as usize + x as usize];
-                // Comparisons with NaN are false: what was not matched stays out.
-                if disparity_px > 0.0 && sigma_px <= SIGMA_MAX_PX && rectifier.is_seen(x, y, disparity_px, margin_px) {
-                    self.matches.push(Match { x_px: x as f32, y_px: y as f32, disparity_px, sigma_px });
+        let (disparity, sigma_px, width) = (&self.disparity, &self.sigma_px, rig.width_px as usize);
+        let rows: Vec<u32> = (0..rig.height_px).step_by(stride).collect();
+        self.bands.resize_with(rows.len().div_ceil(ROWS_A_BAND), Vec::new);
+        rows.par_chunks(ROWS_A_BAND).zip(&mut self.bands).for_each(|(rows, band)| {
+            band.clear();
+            for y in rows.iter().copied() {
+                let row = disparity.row(y).iter().zip(&sigma_px[y as usize * width..]).enumerate();
+                for (x, (disparity_px, sigma_px)) in row.step_by(stride).map(|(x, (d, s))| (x as u32, (*d, *s))) {
+                    // Comparisons with NaN are false: what was not matched stays out.
+                    if disparity_px > 0.0 && sigma_px <= SIGMA_MAX_PX && rectifier.is_seen(x, y, disparity_px, margin_px) {
+                        band.push(Match { x_px: x as f32, y_px: y as f32, disparity_px, sigma_px });
+                    }
                 }
             }
-        }
+        });
+        self.matches.clear();
+        self.bands.iter().for_each(|band| self.matches.extend_from_slice(band));
         Ok(plane::fit(&mut self.matches, rig, self.settings.points_min, self.settings.seed)?)
     }
 
     /// Triangulates the matches into the local frame, each with its standard deviation, and says how densely they lie.
     fn place_points(&mut self, plane: &Plane, rig: &RectifiedRig, world: &WorldFromRectified) -> Sampling {
-        self.points.clear();
         let focal_baseline = rig.focal_px * rig.baseline_m;
-        let mut depths_m = 0.0;
-        for m in &self.matches {
+        let place = |m: &Match| {
             let disparity_px = f64::from(m.disparity_px);
             let ray = rig.ray(f64::from(m.x_px), f64::from(m.y_px));
             let depth_m = focal_baseline / disparity_px;
-            depths_m += depth_m;
             let ned_m = world.apply(&(ray * depth_m));
             // Depth error z²/(f b) · sigma moves the point along its ray. On the water below its new place the surface stands
             // where it stood, so the elevation error is the part of it along the plane's normal.
             let along_normal = plane.normal.dot(&ray);
             let sigma_m = f64::from(m.sigma_px) * depth_m / disparity_px * along_normal;
-            self.points.push(SurfacePoint {
-                north_m: ned_m.x,
-                east_m: ned_m.y,
-                up_m: -ned_m.z as f32,
-                sigma_m: sigma_m as f32,
-            });
-        }
-        self.mean_depth_m = depths_m / self.matches.len().max(1) as f64;
+            SurfacePoint { north_m: ned_m.x, east_m: ned_m.y, up_m: -ned_m.z as f32, sigma_m: sigma_m as f32 }
+        };
+        self.matches.par_iter().with_min_len(POINTS_A_CHUNK).map(place).collect_into_vec(&mut self.points);
+        let sum = |points: &[SurfacePoint]| {
+            points.iter().fold(Vector3::zeros(), |sum, point| sum + Vector3::new(point.north_m, point.east_m, 0.0))
+        };
+        // Sums of fixed chunks: rounding does not depend on how many threads there are.
+        let sums: Vec<Vector3<f64>> = self.points.par_chunks(POINTS_A_CHUNK).map(sum).collect();
+        let depths = |matches: &[Match]| matches.iter().map(|m| focal_baseline / f64::from(m.disparity_px)).sum();
+        let depths_m: Vec<f64> = self.matches.par_chunks(POINTS_A_CHUNK).map(depths).collect();
+        let count = self.points.len().max(1) as f64;
+        self.centre = sums.iter().sum::<Vector3<f64>>().xy() / count;
+        self.mean_depth_m = depths_m.iter().sum::<f64>() / count;
         let pixel_m = self.mean_depth_m / rig.focal_px;
         let window_px = self.window_px();
         Sampling {
@@ -403,11 +425,11 @@ impl Reconstructor {
         let forward = pose.ned_from_body * Vector3::x();
         let heading_rad = forward.y.atan2(forward.x);
         let correction = self.tilt.observe(pair.stamp, slope, heading_rad, pose.attitude_sigma_rad);
-        let centre = self.centre();
-        for point in &mut self.points {
+        let centre = self.centre;
+        self.points.par_iter_mut().with_min_len(POINTS_A_CHUNK).for_each(|point| {
             let offset = Vector2::new(point.north_m, point.east_m) - centre;
             point.up_m -= correction.slope.dot(&offset) as f32;
-        }
+        });
         correction
     }
 
@@ -416,15 +438,9 @@ impl Reconstructor {
         self.refiner.as_ref().map_or(self.settings.block_px, Refiner::window_px)
     }
 
-    /// Mean of the points' horizontal positions.
-    fn centre(&self) -> Vector2<f64> {
-        let sum = self.points.iter().fold(Vector2::zeros(), |sum, point| sum + Vector2::new(point.north_m, point.east_m));
-        sum / self.points.len().max(1) as f64
-    }
-
     /// Adds what an uncertain slope does to each cell's standard deviation.
     fn spread_tilt(&self, grid: &mut halcyon_model::ElevationGrid, slope_sigma: f64) {
-        let centre = self.centre();
+        let centre = self.centre;
         let cols = grid.cols as usize;
         for (i, sigma) in grid.sigma_m.iter_mut().enumerate() {
             let north_m = grid.south_west_north_m + (i / cols) as f64 * grid.cell_m;

@@ -129,12 +129,12 @@ impl Refiner {
 // The loops of a band are compiled for each of these; what they compute is the same to the last bit, because products are never fused
 // with sums.
 
-#[multiversion(targets("x86_64+avx2", "x86_64+avx512f+avx512bw+avx512vl"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl+avx512dq", "x86_64+avx2"))]
 fn smooth_band(smooth: &Smooth, band: usize, scratch: &mut SmoothScratch, to: &mut [f32]) {
     smooth.band(band, scratch, to);
 }
 
-#[multiversion(targets("x86_64+avx2", "x86_64+avx512f+avx512bw+avx512vl"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl+avx512dq", "x86_64+avx2"))]
 fn round_band(round: &Round, band: usize, scratch: &mut RoundScratch, to: &mut [f32], sigma_px: &mut [f32]) {
     round.band(band, scratch, to, sigma_px);
 }

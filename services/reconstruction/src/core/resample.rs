@@ -45,7 +45,7 @@ fn split(x_px: f32) -> (usize, usize) {
 
 /// Sum of the lanes, always in this order.
 #[inline(always)]
-fn sum(x: [f32; LANES]) -> f32 {
+fn sum(x: &[f32; LANES]) -> f32 {
     ((x[0] + x[4]) + (x[2] + x[6])) + ((x[1] + x[5]) + (x[3] + x[7]))
 }
 
@@ -123,8 +123,11 @@ fn lanes(values: &[f32], start: usize) -> &[f32; LANES] {
     values.get(start..start + LANES).and_then(|lanes| lanes.try_into().ok()).unwrap_or(&[0.0; LANES])
 }
 
+/// Samples that are worked on together: their lanes are added up after all are there, which keeps both steps vectorised.
+const BLOCK: usize = 16;
+
 /// Six rows are weighed and added lane by lane, then the lanes.
-#[multiversion(targets("x86_64+avx2", "x86_64+avx512f+avx512bw+avx512vl"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl+avx512dq", "x86_64+avx2"))]
 fn sample_places(
     values: &[f32],
     stride: usize,
@@ -133,26 +136,43 @@ fn sample_places(
     exact: &mut [f32],
     grey: &mut [u8],
 ) {
-    for ((place, exact), grey) in places.iter().zip(exact).zip(grey) {
-        let (across, down) = (&weights[usize::from(place.phase_x)], &weights[usize::from(place.phase_y)]);
-        let mut column = [0.0_f32; LANES];
-        for row in 0..TAPS {
-            let points = lanes(values, place.start as usize + row * stride);
+    let mut products = [[0.0_f32; LANES]; BLOCK];
+    let outputs = exact.chunks_mut(BLOCK).zip(grey.chunks_mut(BLOCK));
+    for (places, (exact, grey)) in places.chunks(BLOCK).zip(outputs) {
+        for (place, product) in places.iter().zip(&mut products) {
+            let (across, down) = (&weights[usize::from(place.phase_x)], &weights[usize::from(place.phase_y)]);
+            let mut column = [0.0_f32; LANES];
+            for row in 0..TAPS {
+                let points = lanes(values, place.start as usize + row * stride);
+                for lane in 0..LANES {
+                    column[lane] += down[row] * points[lane];
+                }
+            }
             for lane in 0..LANES {
-                column[lane] += down[row] * points[lane];
+                product[lane] = column[lane] * across[lane];
             }
         }
-        *exact = sum(std::array::from_fn(|lane| column[lane] * across[lane]));
-        *grey = (*exact + 0.5) as u8;
+        for ((exact, grey), product) in exact.iter_mut().zip(grey).zip(&products) {
+            *exact = sum(product);
+            *grey = (*exact + 0.5) as u8;
+        }
     }
 }
 
-#[multiversion(targets("x86_64+avx2", "x86_64+avx512f+avx512bw+avx512vl"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl+avx512dq", "x86_64+avx2"))]
 fn sample_shifted(row: &[f32], last_px: f32, disparity_px: &[f32], level: f32, weights: &[[f32; LANES]], to: &mut [f32]) {
-    for (x, (disparity_px, to)) in disparity_px.iter().zip(to).enumerate() {
-        let (start, phase) = split((x as f32 - disparity_px).clamp(0.0, last_px));
-        let (points, weights) = (lanes(row, start), &weights[phase]);
-        *to = sum(std::array::from_fn(|lane| points[lane] * weights[lane])) - level;
+    let mut products = [[0.0_f32; LANES]; BLOCK];
+    for (block, (disparity_px, to)) in disparity_px.chunks(BLOCK).zip(to.chunks_mut(BLOCK)).enumerate() {
+        for (x, (disparity_px, product)) in disparity_px.iter().zip(&mut products).enumerate() {
+            let (start, phase) = split(((block * BLOCK + x) as f32 - disparity_px).clamp(0.0, last_px));
+            let (points, weights) = (lanes(row, start), &weights[phase]);
+            for lane in 0..LANES {
+                product[lane] = points[lane] * weights[lane];
+            }
+        }
+        for (to, product) in to.iter_mut().zip(&products) {
+            *to = sum(product) - level;
+        }
     }
 }
 

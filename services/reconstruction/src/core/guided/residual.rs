@@ -68,10 +68,8 @@ struct Scratch {
     windows: Vec<Vec<u16>>,
     powers: [Vec<u16>; 2],
     best: Vec<u16>,
-    winner: Vec<i16>,
+    winner: Vec<u16>,
     second: Vec<u16>,
-    below: Vec<u16>,
-    above: Vec<u16>,
     /// For each pixel of the right picture, the least cost of any pixel that is matched with it, and at which disparity.
     right_best: Vec<u16>,
     right_px: Vec<i16>,
@@ -87,16 +85,15 @@ impl Scratch {
             columns.resize(width + 2 * half, 0);
         }
         self.windows.iter_mut().for_each(|windows| windows.resize(width, 0));
-        for buffer in [&mut self.best, &mut self.second, &mut self.below, &mut self.above, &mut self.right_best] {
+        for buffer in [&mut self.best, &mut self.winner, &mut self.second, &mut self.right_best] {
             buffer.resize(width, 0);
         }
-        self.winner.resize(width, 0);
         self.right_px.resize(width, 0);
     }
 
     fn memory_bytes(&self) -> usize {
         let sums: usize = self.columns.iter().chain(&self.windows).map(Vec::capacity).sum();
-        size_of::<u16>() * (sums + 9 * self.best.capacity()) + self.costs.capacity()
+        size_of::<u16>() * (sums + 5 * self.best.capacity()) + self.costs.capacity()
     }
 }
 
@@ -163,7 +160,7 @@ impl Residual {
 }
 
 /// Horizontal slope (Sobel's) of the rows from `first` on, cut off and shifted to be positive.
-#[multiversion(targets("x86_64+avx2", "x86_64+avx512f+avx512bw+avx512vl"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl+avx512dq", "x86_64+avx2"))]
 fn slopes_of(picture: &[u8], width: usize, height: usize, first: usize, to: &mut [u8]) {
     for (row, to) in to.chunks_exact_mut(width).enumerate() {
         let at = |row: isize| &picture[mirrored(row, height) * width..][..width];
@@ -183,7 +180,7 @@ fn slopes_of(picture: &[u8], width: usize, height: usize, first: usize, to: &mut
     }
 }
 
-#[multiversion(targets("x86_64+avx2", "x86_64+avx512f+avx512bw+avx512vl"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl+avx512dq", "x86_64+avx2"))]
 fn search_band(job: &Job, band: usize, scratch: &mut Scratch, to: &mut [f32]) -> Found {
     job.band(band, scratch, to)
 }
@@ -222,15 +219,22 @@ impl Job<'_> {
         // Beyond the picture it is all the same, and 16 bits hold it.
         const LIMIT_PX: f32 = 16_384.0;
         let whole = |x: usize| self.plane.at(x as f32, row as f32).round().clamp(-LIMIT_PX, LIMIT_PX) as i32;
-        let mut from = (0, whole(0));
-        for x in 1..self.width {
-            let here = whole(x);
-            if here != from.1 {
-                scratch.runs.push((from.0, x, from.1));
-                from = (x, here);
+        let mut from = 0;
+        while from < self.width {
+            let here = whole(from);
+            // It only rises or only falls along a row, rounding included: a run's end can be found by halving.
+            let (mut inside, mut end) = (from, self.width);
+            while end - inside > 1 {
+                let middle = inside + (end - inside) / 2;
+                if whole(middle) == here {
+                    inside = middle;
+                } else {
+                    end = middle;
+                }
             }
+            scratch.runs.push((from, end, here));
+            from = end;
         }
-        scratch.runs.push((from.0, self.width, from.1));
     }
 
     /// Adds the costs of a row to the columns' sums, or takes them away.
@@ -298,9 +302,8 @@ impl Job<'_> {
     #[inline(always)]
     fn choose(&self, scratch: &mut Scratch, to: &mut [f32]) -> Found {
         let width = self.width;
-        let Scratch { windows, best, winner, second, below, above, runs, right_px, .. } = scratch;
-        let (best, winner) = (&mut best[..width], &mut winner[..width]);
-        let (second, below, above) = (&mut second[..width], &mut below[..width], &mut above[..width]);
+        let Scratch { windows, best, winner, second, runs, right_px, .. } = scratch;
+        let (best, winner, second) = (&mut best[..width], &mut winner[..width], &mut second[..width]);
         best.fill(u16::MAX);
         winner.fill(0);
         for (residual, costs) in windows.iter().enumerate() {
@@ -308,21 +311,20 @@ impl Job<'_> {
             for x in 0..width {
                 let is_less = costs[x] < best[x];
                 best[x] = if is_less { costs[x] } else { best[x] };
-                winner[x] = if is_less { residual as i16 } else { winner[x] };
+                winner[x] = if is_less { residual as u16 } else { winner[x] };
             }
         }
         second.fill(u16::MAX);
         for (residual, costs) in windows.iter().enumerate() {
             let costs = &costs[..width];
+            let next = residual as u16 + 1;
             for x in 0..width {
-                let step = residual as i16 - winner[x];
-                let rival = if step.abs() <= 1 { u16::MAX } else { costs[x] };
-                second[x] = second[x].min(rival);
-                below[x] = if step == -1 { costs[x] } else { below[x] };
-                above[x] = if step == 1 { costs[x] } else { above[x] };
+                let is_winner_or_neighbour = next.wrapping_sub(winner[x]) <= 2;
+                let rival = if is_winner_or_neighbour { u16::MAX } else { costs[x] };
+                second[x] = if rival < second[x] { rival } else { second[x] };
             }
         }
-        let last = 2 * self.reach as i16;
+        let last = 2 * self.reach as u16;
         let (least_px, most_px) = (self.range.min_px as f32, self.range.max_px as f32);
         let mut found = Found::default();
         for (from, end, whole) in runs.iter() {
@@ -331,7 +333,8 @@ impl Job<'_> {
                 let is_clear = (100 - UNIQUENESS_PERCENT) * u32::from(second[x]) > 100 * u32::from(best[x]);
                 let is_end = winner[x] == 0 || winner[x] == last;
                 // Costs of absolute differences meet at an angle: equal slopes on both sides (Shimizu and Okutomi 2001).
-                let (best, below, above) = (f32::from(best[x]), f32::from(below[x]), f32::from(above[x]));
+                let cost_at = |residual: u16| f32::from(windows.get(usize::from(residual)).map_or(u16::MAX, |costs| costs[x]));
+                let (best, below, above) = (f32::from(best[x]), cost_at(winner[x].wrapping_sub(1)), cost_at(winner[x] + 1));
                 let fraction = (below - above) / (2.0 * (below.max(above) - best)).max(1.0);
                 let shift = *whole + i32::from(winner[x]) - self.reach;
                 let value_px = shift as f32 + fraction;

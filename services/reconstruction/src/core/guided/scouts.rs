@@ -63,7 +63,7 @@ fn scout(pair: &Pair<'_>, x: usize, y: usize, range: DisparityRange) -> Option<f
 }
 
 /// Correlation (zero-mean, normalised; thesis 4-12) at every disparity from `nearest` on; 0 without texture.
-#[multiversion(targets("x86_64+avx2", "x86_64+avx512f+avx512bw+avx512vl"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl+avx512dq", "x86_64+avx2"))]
 fn correlate(left: &[u8], right: &[u8], width: usize, at: (usize, usize), nearest: usize, to: &mut [f32]) {
     const SIDE: usize = 2 * HALF_PX + 1;
     let row_of = |picture: &'_ [u8], row: usize, from: usize| -> [u8; SIDE] {

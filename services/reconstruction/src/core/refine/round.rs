@@ -1,6 +1,6 @@
 //! One round of correction: warp, multiply, sum, solve.
 
-use super::solve::{SUMS, solve};
+use super::solve::{SUMS, Solved, solve};
 use crate::core::resample::{Margined, Weights};
 use crate::core::window::{BAND_ROWS, mirror_ends, mirrored, sums};
 
@@ -85,7 +85,8 @@ impl Round<'_> {
                 sums(columns, self.window, &mut scratch.powers, windows);
             }
             let before = &self.disparity_px[(first + row) * width..][..width];
-            self.correct(before, &scratch.windows, samples, level.start_px, to, sigma_px);
+            let windows = scratch.windows.each_ref().map(Vec::as_slice);
+            solve(windows, samples, level.start_px, before, self.is_last, Solved { disparity_px: to, sigma_px });
         }
     }
 
@@ -146,10 +147,18 @@ impl Round<'_> {
         }
         row.start_px.iter_mut().for_each(|px| *px -= level.start_px);
         // Slope of the mean of both pictures: central differences, within the row.
-        let (left, warped) = (&row.left[..width], &row.warped[..width]);
-        for (x, slope) in row.slope.iter_mut().enumerate() {
-            let (before, after) = (x.saturating_sub(1), (x + 1).min(width - 1));
-            *slope = 0.25 * ((left[after] + warped[after]) - (left[before] + warped[before]));
+        let (left, warped, slope) = (&row.left[..width], &row.warped[..width], &mut row.slope[..width]);
+        let ends = [(0, 0, 1.min(width - 1)), (width - 1, width.saturating_sub(2), width - 1)];
+        for (x, before, after) in ends {
+            slope[x] = 0.25 * ((left[after] + warped[after]) - (left[before] + warped[before]));
+        }
+        if let Some(inner) = width.checked_sub(2).filter(|inner| *inner > 0) {
+            let (left_before, warped_before) = (&left[..inner], &warped[..inner]);
+            let (left_after, warped_after) = (&left[2..][..inner], &warped[2..][..inner]);
+            let slope = &mut slope[1..][..inner];
+            for x in 0..inner {
+                slope[x] = 0.25 * ((left_after[x] + warped_after[x]) - (left_before[x] + warped_before[x]));
+            }
         }
     }
 
@@ -161,27 +170,5 @@ impl Round<'_> {
         let mut found =
             rows.filter_map(|row| self.disparity_px[row * self.width..][..self.width].iter().find(|px| px.is_finite()));
         found.next().copied().unwrap_or(otherwise)
-    }
-
-    #[inline(always)]
-    fn correct(
-        &self,
-        before: &[f32],
-        windows: &[Vec<f32>; SUMS],
-        samples: f32,
-        base_px: f32,
-        to: &mut [f32],
-        sigma_px: &mut [f32],
-    ) {
-        let width = self.width;
-        let windows = windows.each_ref().map(|windows| &windows[..width]);
-        let (before, to, sigma_px) = (&before[..width], &mut to[..width], &mut sigma_px[..width]);
-        for x in 0..width {
-            let (fits, value_px, sigma) = solve(windows.map(|windows| windows[x]), samples);
-            let keep = if self.is_last { f32::NAN } else { before[x] };
-            let fits = fits & !before[x].is_nan();
-            to[x] = if fits { base_px + value_px } else { keep };
-            sigma_px[x] = if fits { sigma } else { f32::NAN };
-        }
     }
 }
