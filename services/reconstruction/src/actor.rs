@@ -1,5 +1,6 @@
 //! The shell: pairs in, patches out, newest wins.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, anyhow};
@@ -29,6 +30,8 @@ pub async fn run(context: Context, config: Config) -> anyhow::Result<()> {
     let rig = config.rig().map_err(|error| anyhow!(error))?;
     let settings = config.settings().map_err(|error| anyhow!(error))?;
     opencv::core::set_num_threads(config.threads as i32).context("cannot set OpenCV's number of threads")?;
+    let threads = rayon::ThreadPoolBuilder::new().num_threads(config.threads as usize);
+    let threads = Arc::new(threads.build().context("cannot start the engines' threads")?);
     let mut pairs = context.bus.subscribe(&topics::pair(&rig)).await?;
     let surfaces = context.bus.publisher(&topics::surface(&rig)).await?;
     let previews = context.bus.publisher(&topics::preview(&rig)).await?;
@@ -39,6 +42,7 @@ pub async fn run(context: Context, config: Config) -> anyhow::Result<()> {
         check: Pacer::new(config.drift_period_s),
         drift: None,
         failures: 0,
+        threads,
     };
     context.health.ready(format!("waiting for pairs of {rig}"));
     loop {
@@ -60,6 +64,8 @@ struct Shell {
     /// What the last check that said anything said.
     drift: Option<Drift>,
     failures: u32,
+    /// As many as the configuration allows.
+    threads: Arc<rayon::ThreadPool>,
 }
 
 /// What a worker thread brings back.
@@ -87,7 +93,9 @@ impl Shell {
             self.check.done(pair.stamp);
         }
         let (rig, sequence) = (pair.rig.clone(), pair.sequence);
-        let work = tokio::task::spawn_blocking(move || work(reconstructor, watch, &pair, with_preview, with_check)).await?;
+        let threads = Arc::clone(&self.threads);
+        let work = move || threads.install(|| work(reconstructor, watch, &pair, with_preview, with_check));
+        let work = tokio::task::spawn_blocking(work).await?;
         (self.reconstructor, self.watch) = (Some(work.reconstructor), Some(work.watch));
         if with_check {
             self.take_drift(context, &rig, work.drift).await;

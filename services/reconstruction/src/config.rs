@@ -13,8 +13,8 @@ use crate::core::reconstruct::Settings;
 pub struct Config {
     /// The rig whose pairs are reconstructed.
     pub rig: String,
-    /// Dense matching: `sgbm`, `sgbm-3way` (threaded, less memory), `sgbm-hh` (best, slow), `sgm` or `sgm8` (our own, fastest of
-    /// the dense ones) or `bm` (fast, sparse).
+    /// Dense matching: `guided` (a few disparities about the mean plane of the water: fastest by far), `sgm` or `sgm8` (everything,
+    /// our own), or OpenCV's `sgbm`, `sgbm-3way` (threaded, less memory), `sgbm-hh` (slow), `bm` (sparse).
     pub engine: String,
     /// Window of the matcher, pixels, odd; 0 takes what suits the engine.
     pub block_px: u32,
@@ -42,7 +42,8 @@ pub struct Config {
     /// The calibration is checked against what the cameras see this often, seconds; 0 turns that off. Rows off by more than half a
     /// pixel make the service call itself degraded.
     pub drift_period_s: f64,
-    /// Threads that OpenCV may use in this process. Its default, all, slows the other services of a small on-board computer.
+    /// Threads that the engines, ours and OpenCV's, may use in this process. All of them would slow the other services of a small
+    /// on-board computer.
     pub threads: u32,
 }
 

@@ -182,7 +182,8 @@ fn match_finds_a_known_shift_with_every_engine_and_both_formats() {
     let folder = tempfile::tempdir().unwrap();
     let (left, right) = shifted_pair(folder.path(), 20);
     for engine in Engine::ALL.into_iter().chain(StudyMethod::ALL.map(Engine::Study)) {
-        let (engine, disparities) = (engine.name(), if matches!(engine, Engine::Sgm(_) | Engine::Study(_)) { 22 } else { 32 });
+        let (engine, disparities) =
+            (engine.name(), if matches!(engine, Engine::Guided | Engine::Sgm(_) | Engine::Study(_)) { 22 } else { 32 });
         let out = folder.path().join("d.pfm");
         // 21 is no multiple of 16: rounded up, not refused.
         let report = cli::match_pair(left.as_ref(), right.as_ref(), 21.0, engine, &MatchOptions::default(), &out).unwrap();

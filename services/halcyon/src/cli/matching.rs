@@ -24,9 +24,9 @@ pub(super) struct Args {
     /// Largest disparity to search, pixels
     #[arg(long, value_name = "PX", allow_negative_numbers = true)]
     max_disparity: f64,
-    /// For work bm, sgbm, sgbm-3way, sgbm-hh4, sgbm-hh, sgm or sgm8. For study the reference matcher: wta-COST (winner takes all) or
+    /// For work guided (about a plane, sgm where there is none), sgm, sgm8, or OpenCV's bm, sgbm, sgbm-3way, sgbm-hh4 or sgbm-hh. For study the reference matcher: wta-COST (winner takes all) or
     /// sgm-COST (semi-global), where COST is sad, ssd, ncc, rank, census or mi
-    #[arg(long, default_value = "sgbm")]
+    #[arg(long, default_value = "guided")]
     engine: String,
     /// Side of the window, pixels, odd; without it what suits the engine
     #[arg(long, value_name = "PX")]

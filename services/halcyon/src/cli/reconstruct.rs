@@ -69,7 +69,7 @@ struct Pose {
 #[derive(Debug, clap::Args)]
 struct How {
     /// bm, sgbm, sgbm-3way, sgbm-hh, sgm or sgm8
-    #[arg(long, default_value = "sgbm")]
+    #[arg(long, default_value = "guided")]
     engine: String,
     /// Cell of the elevation grid, metres; otherwise about ten pixels
     #[arg(long, value_name = "M", allow_negative_numbers = true)]

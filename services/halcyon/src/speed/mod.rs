@@ -118,13 +118,13 @@ impl Bench {
         let mut rows = Vec::new();
         for (done, scene) in scenes.iter().enumerate() {
             progress(done, total, &scene.name);
-            rows.extend(matching::run(scene, if quick { 1 } else { 5 })?);
+            rows.extend(matching::run(scene, if quick { 1 } else { 3 })?);
         }
         progress(scenes.len(), total, "sub-pixel bias");
         let sub_pixel = sub_pixel::run(if quick { 3 } else { 10 })?;
         for (done, size) in sizes.iter().enumerate() {
             progress(scenes.len() + 1 + done, total, &format!("pair to patch, {}x{}", size.0, size.1));
-            rows.extend(pipeline::run(*size, if quick { 3 } else { 9 })?);
+            rows.extend(pipeline::run(*size, if quick { 3 } else { 7 })?);
         }
         progress(total, total, "done");
         Ok(SpeedReport { rows, sub_pixel })

@@ -308,12 +308,21 @@ impl Reconstructor {
         let world = pair.pose.as_ref().map(|pose| WorldFromRectified::from_pose(pose, &pair.calibration, rig));
         let guide = self.guide(world.as_ref(), rig);
         let expected = world.and_then(|world| expected_range(&world, rig, self.level_m, self.settings.height_margin_m));
-        if let Some(expected) = expected
-            && expected.min_px < useful_px
-            && let Ok(plane) = self.match_in(DisparityRange { max_px: expected.max_px.min(useful_px), ..expected }, guide, rig)
-        {
-            return Ok(plane);
-        }
+        let expected = expected.filter(|expected| expected.min_px < useful_px);
+        let expected = expected.map(|range| DisparityRange { max_px: range.max_px.min(useful_px), ..range });
+        let full = match expected {
+            // A guide needs no narrow range, which would be wrong with it; but close to the water a wider one than was configured.
+            Some(expected) if self.settings.engine == Engine::Guided => {
+                DisparityRange { min_px: full.min_px.min(expected.min_px), max_px: full.max_px.max(expected.max_px) }
+            }
+            Some(expected) => {
+                if let Ok(plane) = self.match_in(expected, guide, rig) {
+                    return Ok(plane);
+                }
+                full
+            }
+            None => full,
+        };
         self.match_in(full, guide, rig).map_err(|error| {
             let height_m = world.map_or(f64::INFINITY, |world| -world.origin_ned_m.z - self.level_m);
             let disparity_px = rig.focal_px * rig.baseline_m / height_m;
