@@ -10,14 +10,17 @@ use halcyon::accuracy::{Flight, TankErrors, TankRun, fly, honesty, plane, still_
 fn a_plane_at_half_a_metre() {
     let [first_m, second_m, third_m] = [0.092, 0.12, 0.15].map(|baseline_m| plane(baseline_m, 3).unwrap().rmse_m);
     println!("{first_m} {second_m} {third_m}");
-    assert!(first_m < 0.7e-3 && second_m < first_m + 0.1e-3 && third_m < first_m + 0.1e-3);
+    assert!(first_m < 0.7e-3 && second_m < 1.05 * first_m && third_m < 1.05 * first_m);
 }
 
 /// Thesis: 2.3 mm; wanted: 0.3 mm.
 #[test]
 fn still_water_has_no_waves() {
-    let h_mean_m = still_water(0.99, 40, 12).unwrap().h_mean_m;
-    assert!(h_mean_m < 0.25e-3, "{h_mean_m}");
+    let still = still_water(0.99, 40, 12).unwrap();
+    println!("{} {}", still.h_mean_of_levels_m, still.h_mean_m);
+    // Raw, and so above nothing; and what the chain makes of it.
+    assert!(still.h_mean_of_levels_m > 0.0 && still.h_mean_of_levels_m < 0.25e-3, "{}", still.h_mean_of_levels_m);
+    assert!(still.h_mean_m < 0.25e-3, "{}", still.h_mean_m);
 }
 
 /// Thesis: 4.0 mm, 7.8 mm, R² 0.93; wanted: 0.5 mm, 1.0 mm, 0.01 Hz, 0.995.
@@ -26,7 +29,7 @@ fn the_wave_tank() {
     let errors = TankErrors::of(&tank(&TankRun::quick()).unwrap());
     println!("{errors:?}");
     assert!(errors.h_mean_m < 0.4e-3 && errors.h_s_m < 0.9e-3, "{errors:?}");
-    assert!(errors.peak_hz < 0.008 && errors.r_squared > 0.997, "{errors:?}");
+    assert!(errors.peak_hz < 0.008 && errors.amplitude_m < 0.2e-3, "{errors:?}");
 }
 
 /// Thesis: 7.5 mm and 11.6 mm, means over its repetitions; wanted: 2 mm and 3 mm. And whatever the error, the interval says so.

@@ -76,12 +76,15 @@ pub fn run(extent: Extent, progress: &mut dyn FnMut(usize, usize, &str)) -> Resu
     rows.push(AccuracyRow::new(name(9.2), "RMSE", "mm", first_mm, (0.0, 1.0)).thesis(8.8));
     for (baseline_m, thesis_mm) in [(0.12, 10.8), (0.15, 25.2)] {
         let value_mm = plane(baseline_m, pairs)?.rmse_m * MM;
-        // No worse than the shortest, to a tenth of what is asked.
-        let row = AccuracyRow::new(name(baseline_m * 100.0), "RMSE", "mm", value_mm, (0.0, first_mm + 0.1));
+        // No worse than the shortest, give or take what a few pairs scatter.
+        let row = AccuracyRow::new(name(baseline_m * 100.0), "RMSE", "mm", value_mm, (0.0, 1.05 * first_mm));
         rows.push(row.thesis(thesis_mm));
     }
-    let still_mm = still_water(0.99, if full { 200 } else { 40 }, 12)?.h_mean_m * MM;
-    rows.push(AccuracyRow::new("still water at 0.99 m", "false H_m", "mm", still_mm, (0.0, 0.3)).thesis(2.3));
+    let still = still_water(0.99, if full { 200 } else { 40 }, 12)?;
+    let raw_mm = still.h_mean_of_levels_m * MM;
+    rows.push(AccuracyRow::new("still water at 0.99 m", "false H_m, pair levels", "mm", raw_mm, (0.0, 0.3)).thesis(2.3));
+    // What the thesis could not do: the noise that the chain knows of is no wave.
+    rows.push(AccuracyRow::new("still water at 0.99 m", "false H_m, noise told apart", "mm", still.h_mean_m * MM, (0.0, 0.3)));
 
     progress(1, total, "wave tank");
     let run = if full { TankRun::thesis() } else { TankRun::quick() };
@@ -90,7 +93,11 @@ pub fn run(extent: Extent, progress: &mut dyn FnMut(usize, usize, &str)) -> Resu
     rows.push(AccuracyRow::new(tank_name, "mean |error| of H_m", "mm", errors.h_mean_m * MM, (0.0, 0.5)).thesis(4.0));
     rows.push(AccuracyRow::new(tank_name, "mean |error| of H_s", "mm", errors.h_s_m * MM, (0.0, 1.0)).thesis(7.8));
     rows.push(AccuracyRow::new(tank_name, "largest |error| of peak frequency", "Hz", errors.peak_hz, (0.0, 0.01)).thesis(0.02));
-    rows.push(AccuracyRow::new(tank_name, "R² of peak amplitude", "1", errors.r_squared, (0.995, 1.0)).thesis(0.93));
+    if let Some(r_squared) = errors.r_squared {
+        rows.push(AccuracyRow::new(tank_name, "R² of peak amplitude", "1", r_squared, (0.995, 1.0)).thesis(0.93));
+    }
+    let amplitude_mm = errors.amplitude_m * MM;
+    rows.push(AccuracyRow::new(tank_name, "mean |error| of peak amplitude", "mm", amplitude_mm, (0.0, 0.25)));
 
     progress(2, total, "from the air");
     let (mut h_mean_mm, mut h_s_mm, mut flights) = (0.0, 0.0, 0.0);

@@ -9,6 +9,7 @@ use halcyon_wave_assessment::core::Assessor;
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::scene::{Scene, SceneError, chain, measure, start, thesis_rig};
+use super::truth::h_mean_and_h_s_m;
 
 /// Cameras above the water, metres.
 const HEIGHT_M: f64 = 0.99;
@@ -53,8 +54,11 @@ pub struct TankErrors {
     pub h_s_m: f64,
     /// Largest absolute error of the peak frequency, hertz.
     pub peak_hz: f64,
-    /// Coefficient of determination of measured against true peak amplitudes (figure 5-29), about the line of equality.
-    pub r_squared: f64,
+    /// Mean absolute error of the peak amplitude, metres.
+    pub amplitude_m: f64,
+    /// Coefficient of determination of measured against true peak amplitudes (figure 5-29), about the line of equality, which is stricter
+    /// than a fitted one; `None` where all waves are of one height, and there is nothing to explain.
+    pub r_squared: Option<f64>,
 }
 
 /// A record of the water's height that came out of pairs, and its wave heights.
@@ -64,6 +68,8 @@ pub struct Assessed {
     pub h_mean_m: f64,
     /// H_s, metres.
     pub h_s_m: f64,
+    /// H_m of the mean level of each pair, as the thesis took it: plain zero up-crossings, no noise taken out, metres.
+    pub h_mean_of_levels_m: f64,
     /// Elevation, metres, with its time in seconds.
     pub trace: Vec<(f64, f64)>,
 }
@@ -118,13 +124,12 @@ impl TankErrors {
         let middle = mean(&truth);
         let spread = mean(&|record| (truth(record) - middle).powi(2));
         let residual = mean(&|record| (truth(record) - record.peak.1).powi(2));
-        // With one height there is no spread to explain; then against the amplitudes themselves.
-        let total = if spread > 0.0 { spread } else { mean(&|record| truth(record).powi(2)) };
         Self {
             h_mean_m: mean(&|record| (record.stereo.h_mean_m - record.height_m).abs()),
             h_s_m: mean(&|record| (record.stereo.h_s_m - record.height_m).abs()),
             peak_hz,
-            r_squared: 1.0 - residual / total,
+            amplitude_m: mean(&|record| (truth(record) - record.peak.1).abs()),
+            r_squared: (spread > 0.0).then(|| 1.0 - residual / spread),
         }
     }
 }
@@ -135,16 +140,21 @@ pub(super) fn assess(scene: &mut Scene, height_m: f64, pairs: usize) -> Result<A
     let mut assessor = Assessor::new(config).map_err(|_| SceneError::NoResult("the rig's name is not valid"))?;
     let mut chain = chain(0.04, true);
     let leaning = UnitQuaternion::from_euler_angles(0.02, -0.03, 0.2);
-    let mut last = None;
+    let (mut last, mut levels_m) = (None, Vec::with_capacity(pairs));
     for i in 0..pairs {
         let t_s = i as f64 / RATE_HZ;
         let pair = scene.pair(t_s, Vector3::new(0.0, 0.0, -height_m), &leaning, None)?;
         let patch = measure(&mut chain, &pair)?;
+        levels_m.extend(patch.level_m);
         last = assessor.observe(&patch, start().plus_secs_f64(t_s)).ok().flatten().or(last);
     }
     let state = last.ok_or(SceneError::NoResult("no sea state came out"))?;
+    let heights_m = |levels_m: &[f64]| Some(h_mean_and_h_s_m(&[levels_m.to_vec()])).filter(|heights| heights.0.is_finite());
     match (state.h_mean_m, state.h_s_m) {
-        (Some(h_mean_m), Some(h_s_m)) => Ok(Assessed { h_mean_m: h_mean_m.value, h_s_m: h_s_m.value, trace: trace_of(&state) }),
+        (Some(h_mean_m), Some(h_s_m)) => {
+            let h_mean_of_levels_m = heights_m(&levels_m).map_or(f64::NAN, |(h_mean_m, _)| h_mean_m);
+            Ok(Assessed { h_mean_m: h_mean_m.value, h_s_m: h_s_m.value, h_mean_of_levels_m, trace: trace_of(&state) })
+        }
         _ => Err(SceneError::NoResult("the sea state has no wave heights")),
     }
 }

@@ -45,7 +45,7 @@ pub(super) fn run(lab: &Lab) -> Result<Exhibit, LabError> {
         both("principal point v0, px", &|i| (cameras[i].0.cy_px, cameras[i].0.cy_px_high), [242.1296, 250.989]),
     ];
     for (k, (name, thesis)) in [("k1", [-0.1075, 0.0467]), ("k2", [2.2123, -0.0674])].into_iter().enumerate() {
-        rows.push(both(name, &|i| (cameras[i].0.distortion[k], cameras[i].0.distortion_high[k]), thesis));
+        rows.push(both(name, &|i| (cameras[i].0.distortion[k], cameras[i].0.distortion_high[k].unwrap_or(f64::NAN)), thesis));
     }
     exhibit.table(vec!["", "left", "thesis", "right", "thesis"], rows);
     let turn = calibration.rig.right_from_left;

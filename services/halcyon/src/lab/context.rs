@@ -108,7 +108,7 @@ impl Lab {
     pub(super) fn object(&self) -> Result<Object, LabError> {
         let (left, right) = files::read_pair(&self.sample("aloeL.jpg")?, &self.sample("aloeR.jpg")?)?;
         let truth = files::read_truth(&self.sample("aloeGT.png")?, 1.0)?;
-        Ok(Object { left, right, truth, range: DisparityRange { min_px: 16, max_px: 127 } })
+        Ok(Object { left, right, truth, range: DisparityRange { min_px: 16, max_px: 223 } })
     }
 
     /// The rig that took the sample board pictures.

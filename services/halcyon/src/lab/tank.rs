@@ -90,7 +90,10 @@ pub(super) fn run(lab: &Lab) -> Result<Exhibit, LabError> {
     exhibit.find("mean |error| of H_m, stereo", "mm", MM * errors.h_mean_m, Some(4.0));
     exhibit.find("mean |error| of H_s, stereo", "mm", MM * errors.h_s_m, Some(7.8));
     exhibit.find("largest |error| of the peak frequency, stereo", "Hz", errors.peak_hz, Some(0.02));
-    exhibit.find("R² of peak amplitude (figure 5-29)", "1", errors.r_squared, Some(0.93));
+    if let Some(r_squared) = errors.r_squared {
+        exhibit.find("R² of peak amplitude (figure 5-29)", "1", r_squared, Some(0.93));
+    }
+    exhibit.find("mean |error| of peak amplitude", "mm", 1e3 * errors.amplitude_m, None);
     let sensors: Vec<Sensors> = records.iter().zip(100..).map(|(record, seed)| Sensors::new(record, seed)).collect();
     heights(&mut exhibit, &sensors)?;
     // The middle height of each frequency stands for it in the charts.

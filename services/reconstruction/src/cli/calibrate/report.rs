@@ -37,12 +37,12 @@ pub struct CameraReport {
     pub cy_px_low: f64,
     /// 95 % interval.
     pub cy_px_high: f64,
-    /// k1, k2, p1, p2, k3; what the model does not free is zero, without doubt.
+    /// k1, k2, p1, p2, k3; what the model does not free is zero.
     pub distortion: [f64; 5],
+    /// 95 % intervals; null where the model holds it at zero, which says nothing of how far from zero it is.
+    pub distortion_low: [Option<f64>; 5],
     /// 95 % intervals.
-    pub distortion_low: [f64; 5],
-    /// 95 % intervals.
-    pub distortion_high: [f64; 5],
+    pub distortion_high: [Option<f64>; 5],
     /// Standard deviations of fx, fy, cx, cy (pixels), k1, k2, p1, p2, k3.
     pub sigmas: [f64; INTRINSICS],
     /// Its part of the stereo reprojection error, pixels.
@@ -57,6 +57,7 @@ impl CameraReport {
     fn new(camera: &CameraIntrinsics, sigmas: &[f64; INTRINSICS], rms_px: f64, map: &CoverageMap) -> Self {
         let CameraIntrinsics { fx_px, fy_px, cx_px, cy_px, distortion } = *camera;
         let off = sigmas.map(|sigma| SIGMAS_95 * sigma);
+        let is_free = |k: usize| sigmas[4 + k] > 0.0;
         Self {
             fx_px,
             fx_px_low: fx_px - off[0],
@@ -71,8 +72,8 @@ impl CameraReport {
             cy_px_low: cy_px - off[3],
             cy_px_high: cy_px + off[3],
             distortion,
-            distortion_low: std::array::from_fn(|k| distortion[k] - off[4 + k]),
-            distortion_high: std::array::from_fn(|k| distortion[k] + off[4 + k]),
+            distortion_low: std::array::from_fn(|k| is_free(k).then(|| distortion[k] - off[4 + k])),
+            distortion_high: std::array::from_fn(|k| is_free(k).then(|| distortion[k] + off[4 + k])),
             sigmas: *sigmas,
             rms_px,
             coverage: map.share(),

@@ -47,6 +47,8 @@ pub struct RowMatch {
 pub struct DriftSettings {
     /// Row error by which a calibration has drifted, pixels RMS over the picture.
     pub row_px_max: f64,
+    /// A yaw that changes disparities by more than this is drift, pixels.
+    pub disparity_px_max: f64,
     /// Said only when the row error is above it by this many of its standard deviations.
     pub sigmas: f64,
     /// A pair with fewer matches says nothing.
@@ -57,7 +59,7 @@ pub struct DriftSettings {
 
 impl Default for DriftSettings {
     fn default() -> Self {
-        Self { row_px_max: 0.5, sigmas: 2.0, matches_min: 40, pairs: 6 }
+        Self { row_px_max: 0.5, disparity_px_max: 1.0, sigmas: 2.0, matches_min: 40, pairs: 6 }
     }
 }
 
@@ -72,9 +74,13 @@ pub struct Drift {
     pub turn_rad: [f64; 3],
     /// Its standard deviations.
     pub turn_sigma_rad: [f64; 3],
+    /// What the yaw does to disparities in the middle of the picture, pixels: rows hardly show it, distances do.
+    pub disparity_px: f64,
+    /// Its standard deviation.
+    pub disparity_sigma_px: f64,
     /// Matches it is made of.
     pub matches: usize,
-    /// Off by more than the stated row error, surely.
+    /// Off by more than the stated row error, or by more than the stated disparity, surely.
     pub has_drifted: bool,
 }
 
@@ -85,6 +91,7 @@ struct PairSums {
     /// Mean of a aᵀ, a being what a match's row depends on: turns the five numbers into a mean square row error.
     spread: Matrix5,
     matches: usize,
+    focal_px: f64,
 }
 
 /// Keypoints of each picture: few, so that a look costs milliseconds.
@@ -195,7 +202,13 @@ impl DriftWatch {
         }
         spread.fill_upper_triangle_with_lower_triangle();
         let per_variance = 1.0 / (sigma_px * sigma_px);
-        Some(PairSums { normal: normal * per_variance, right: right * per_variance, spread, matches: kept })
+        Some(PairSums {
+            normal: normal * per_variance,
+            right: right * per_variance,
+            spread,
+            matches: kept,
+            focal_px: rig.focal_px,
+        })
     }
 
     fn drift(&self) -> Option<Drift> {
@@ -214,13 +227,20 @@ impl DriftWatch {
         let slope = spread * change;
         let row_sigma_px = (slope.dot(&(covariance * slope)) / mean_square.max(scatter)).sqrt().max((scatter / 5.0).sqrt());
         let sigma = |i: usize| covariance[(i, i)].max(0.0).sqrt();
+        let focal_px = self.pairs.back().map_or(0.0, |pair| pair.focal_px);
+        let (disparity_px, disparity_sigma_px) = (focal_px * change[1].abs(), focal_px * sigma(1));
+        let DriftSettings { sigmas, row_px_max, disparity_px_max, .. } = self.settings;
+        let is_beyond = |value_px: f64, sigma_px: f64, limit_px: f64| value_px - sigmas * sigma_px > limit_px;
         Some(Drift {
+            disparity_px,
+            disparity_sigma_px,
             row_rms_px,
             row_sigma_px,
             turn_rad: [change[0], change[1], change[2]],
             turn_sigma_rad: [sigma(0), sigma(1), sigma(2)],
             matches: self.pairs.iter().map(|pair| pair.matches).sum(),
-            has_drifted: row_rms_px - self.settings.sigmas * row_sigma_px > self.settings.row_px_max,
+            has_drifted: is_beyond(row_rms_px, row_sigma_px, row_px_max)
+                || is_beyond(disparity_px, disparity_sigma_px, disparity_px_max),
         })
     }
 }
@@ -302,6 +322,7 @@ mod tests {
             (Vector3::zeros(), Vector3::zeros()),
             (Vector3::new(0.2, 0.0, 0.0) * deg, Vector3::zeros()),
             (Vector3::new(0.0, 1.5, 0.0) * deg, Vector3::zeros()),
+            (Vector3::new(0.0, -0.5, 0.0) * deg, Vector3::zeros()),
             (Vector3::new(0.0, 0.0, 0.6) * deg, Vector3::zeros()),
             (Vector3::zeros(), Vector3::new(0.0, 0.02, 0.0)),
             (Vector3::zeros(), Vector3::new(0.0, 0.0, -0.05)),
@@ -319,7 +340,9 @@ mod tests {
             let margin_px = 3.0 * drift.row_sigma_px + 0.05 * truth_px;
             assert!((drift.row_rms_px - truth_px).abs() < margin_px, "{truth_px} {drift:?}");
             assert!(drift.row_sigma_px < 0.05, "{drift:?}");
-            assert_eq!(drift.has_drifted, truth_px > 0.5, "{truth_px} {drift:?}");
+            // Yaw moves rows by f x y ω only, but disparities by f ω: 1.5° make 5 m of water 7.7 m.
+            let disparity_px = RIG.focal_px * turn.y.abs();
+            assert_eq!(drift.has_drifted, truth_px > 0.5 || disparity_px > 1.5, "{truth_px} {disparity_px} {drift:?}");
             for i in 0..3 {
                 let off = drift.turn_rad[i] - turn[i];
                 assert!(off.abs() < 4.0 * drift.turn_sigma_rad[i] + 0.05 * turn.norm(), "{i} {turn} {drift:?}");

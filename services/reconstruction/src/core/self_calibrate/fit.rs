@@ -202,6 +202,8 @@ impl Fit<'_> {
         let drift_px = (before.iter().zip(&after).map(|(b, a)| (b - a) * (b - a)).sum::<f64>() / before.len() as f64).sqrt();
         let pose_covariance: SMatrix<f64, 5, 5> = best.covariance.fixed_view::<5, 5>(0, 0).into_owned();
         let change = SVector::<f64, 5>::from([turn_rad.x, turn_rad.y, turn_rad.z, direction_rad.x, direction_rad.y]);
+        // Rows hardly show a yaw; disparities, and with them every distance, do: by f ω.
+        let vergence_px = given.left.fx_px * (turn_rad.y.abs() - 2.0 * sigma(1)).max(0.0);
         let distance = pose_covariance.cholesky().map_or(f64::NAN, |cholesky| change.dot(&cholesky.solve(&change)));
         Ok(SelfCalibration {
             rig,
@@ -218,7 +220,7 @@ impl Fit<'_> {
             before: RowErrors::new(&before),
             after: RowErrors::new(&after),
             drift_px,
-            has_drifted: distance > CHI2_5_MAX && drift_px > self.settings.drift_px_max,
+            has_drifted: distance > CHI2_5_MAX && drift_px.max(vergence_px) > self.settings.drift_px_max,
             is_flat,
             alternative,
         })

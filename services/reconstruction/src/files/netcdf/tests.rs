@@ -148,12 +148,29 @@ fn wass_has_its_names_and_millimetres() {
     assert_eq!(values("scale"), [0.4]);
     assert!((values("time")[2] - 1.000_000_002).abs() < 1e-12);
     assert_eq!(values("maskZ").iter().sum::<f64>(), 29.0, "the union of three times eleven cells");
-    // A rig that stands still has a level that is water's, not an autopilot's.
+    // A rig that stands still has a level that is water's, not an autopilot's; its datum is whatever the first pair saw, here a crest.
     let fixed = folder.path().join("fixed.nc");
-    drifting_in(folder.path(), CloudFrame::Plane).write_wass(&fixed, &about()).unwrap();
-    let fixed = ::netcdf::open(&fixed).unwrap().variable("Z").unwrap().get_values::<f64, _>(..).unwrap();
-    let raised = fixed.iter().zip(&z_mm).filter(|(_, z_mm)| z_mm.is_finite());
-    assert!(raised.into_iter().all(|(fixed, z_mm)| (fixed - z_mm - 125.0).abs() < 1e-2));
+    let mut series = Series::beside(&folder.path().join("fixed-out.nc"), CloudFrame::Plane).unwrap();
+    for (i, level_m) in [0.0, -0.02, -0.04].into_iter().enumerate() {
+        series.push(&SurfacePatch { level_m: Some(level_m), ..patch(START_NS + i as i64 * 500_000_001, 0, 0, 4, 3) }).unwrap();
+    }
+    series.write_wass(&fixed, &about()).unwrap();
+    let fixed = ::netcdf::open(&fixed).unwrap();
+    let z_mm = fixed.variable("Z").unwrap().get_values::<f64, _>(..).unwrap();
+    let (crest, trough) = (&z_mm[..12], &z_mm[24..]);
+    let known = crest.iter().zip(trough).filter(|(crest_mm, trough_mm)| crest_mm.is_finite() && trough_mm.is_finite());
+    let steps: Vec<f64> = known.map(|(crest_mm, trough_mm)| crest_mm - trough_mm).collect();
+    assert!(!steps.is_empty() && steps.iter().all(|step_mm| (step_mm - 40.0).abs() < 1e-2));
+    let all: Vec<f64> = z_mm.iter().copied().filter(|z_mm| z_mm.is_finite()).collect();
+    let plain = patch(0, 0, 0, 4, 3);
+    let first: Vec<f64> = plain.grid.elevation_m.iter().filter(|z| z.is_finite()).map(|z| 1e3 * f64::from(*z)).collect();
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    assert!((mean(&all) - mean(&first)).abs() < 1e-2, "levels are above their mean");
+    let zmean: f64 = match fixed.group("meta").unwrap().unwrap().attribute("zmean").unwrap().value().unwrap() {
+        ::netcdf::AttributeValue::Double(zmean) => zmean,
+        other => panic!("{other:?}"),
+    };
+    assert!((1e3 * zmean - mean(&all)).abs() < 1e-2);
     let meta = file.group("meta").unwrap().unwrap();
     assert_eq!(meta.variable("intr0").unwrap().get_values::<f64, _>(..).unwrap()[..3], [343.1, 0.0, 159.5]);
 }

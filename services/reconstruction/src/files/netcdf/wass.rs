@@ -33,8 +33,8 @@ pub(super) fn fill(file: &mut FileMut, spool: &mut Spool, about: &About) -> Resu
     times.put_values(&seconds, [..count])?;
 
     grids(file, spool)?;
-    let range_mm = heights(file, spool)?;
-    meta(file, about, range_mm)?;
+    let range_and_mean_mm = heights(file, spool)?;
+    meta(file, about, range_and_mean_mm)?;
     Ok(())
 }
 
@@ -52,8 +52,8 @@ fn grids(file: &mut FileMut, spool: &Spool) -> Result<(), Error> {
     Ok(())
 }
 
-/// Writes `Z` and `maskZ` (1 where any patch has a value); returns the least and largest `Z`, millimetres.
-fn heights(file: &mut FileMut, spool: &mut Spool) -> Result<(f64, f64), FillError> {
+/// Writes `Z` and `maskZ` (1 where any patch has a value); returns the least, largest and mean `Z`, millimetres.
+fn heights(file: &mut FileMut, spool: &mut Spool) -> Result<[f64; 3], FillError> {
     let (_, extent) = spool.grid();
     let (rows, cols) = (extent.rows, extent.cols);
     let mut z = file.add_variable::<f32>("Z", &["count", "X", "Y"])?;
@@ -68,14 +68,20 @@ fn heights(file: &mut FileMut, spool: &mut Spool) -> Result<(f64, f64), FillErro
     let mut mask = vec![0.0_f32; rows * cols];
     let (mut least, mut largest) = (f64::INFINITY, f64::NEG_INFINITY);
     let (mut cells, entries) = (Cells::default(), spool.entries.clone());
+    // Levels are above a datum that the first pair chose; `Z` is above the mean of all.
+    let levels = || entries.iter().filter_map(|entry| entry.level_m);
+    let datum_m = levels().sum::<f64>() / levels().count().max(1) as f64;
+    let (mut sum, mut count) = (0.0, 0.0);
     for (time, entry) in entries.iter().enumerate() {
         spool.read(entry, &mut cells)?;
-        let level_m = if fixed { entry.level_m.unwrap_or(0.0) as f32 } else { 0.0 };
+        let level_m = if fixed { (entry.level_m.unwrap_or(datum_m) - datum_m) as f32 } else { 0.0 };
         for (value, seen) in cells.elevation_m.iter_mut().zip(&mut mask) {
             *value = (*value + level_m) * MM_PER_M as f32;
             if value.is_finite() {
                 *seen = 1.0;
-                (least, largest) = (least.min(f64::from(*value)), largest.max(f64::from(*value)));
+                let value = f64::from(*value);
+                (least, largest) = (least.min(value), largest.max(value));
+                (sum, count) = (sum + value, count + 1.0);
             }
         }
         z.put_values(&cells.elevation_m, ([time, 0, 0], [1, rows, cols]))?;
@@ -83,18 +89,18 @@ fn heights(file: &mut FileMut, spool: &mut Spool) -> Result<(f64, f64), FillErro
     let mut variable = file.add_variable::<f32>("maskZ", &["X", "Y"])?;
     describe(&mut variable, &[("units", ""), ("long_name", "Z mask over the XY grid"), ("field", "Z, scalar, series")])?;
     variable.put_values(&mask, ..)?;
-    Ok((least, largest))
+    Ok([least, largest, if count > 0.0 { sum / count } else { 0.0 }])
 }
 
 /// The group `meta`: sizes and intrinsics; `zmin`, `zmax` and `zmean` are in metres there.
-fn meta(file: &mut FileMut, about: &About, range_mm: (f64, f64)) -> Result<(), Error> {
+fn meta(file: &mut FileMut, about: &About, [least_mm, largest_mm, mean_mm]: [f64; 3]) -> Result<(), Error> {
     let rig = &about.calibration;
     let mut meta = file.add_group("meta")?;
     meta.add_attribute("image_width", rig.width_px as i32)?;
     meta.add_attribute("image_height", rig.height_px as i32)?;
-    meta.add_attribute("zmin", range_mm.0 / MM_PER_M)?;
-    meta.add_attribute("zmax", range_mm.1 / MM_PER_M)?;
-    meta.add_attribute("zmean", 0.0)?;
+    meta.add_attribute("zmin", least_mm / MM_PER_M)?;
+    meta.add_attribute("zmax", largest_mm / MM_PER_M)?;
+    meta.add_attribute("zmean", mean_mm / MM_PER_M)?;
     meta.add_dimension("V3", 3)?;
     meta.add_dimension("DistV", 5)?;
     let matrix = |camera: &CameraIntrinsics| camera.matrix().transpose().as_slice().to_vec();
