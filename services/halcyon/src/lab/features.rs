@@ -70,7 +70,6 @@ fn counts(exhibit: &mut Exhibit, of: &str, left: &Image, right: &Image, thesis: 
         ransac: RansacSettings { threshold_px: 1.0, inliers_min: 8, ..RansacSettings::default() },
         // None is cut off: counts are the experiment.
         keypoints_max: KEYPOINTS_MAX,
-        ..StudySettings::default()
     };
     let (mut all, mut pictures): (Vec<FeatureCounts>, _) = (Vec::new(), Vec::new());
     for method in Method::ALL {

@@ -142,10 +142,10 @@ fn sample_places(
         for (place, product) in places.iter().zip(&mut products) {
             let (across, down) = (&weights[usize::from(place.phase_x)], &weights[usize::from(place.phase_y)]);
             let mut column = [0.0_f32; LANES];
-            for row in 0..TAPS {
+            for (row, weight) in down.iter().enumerate().take(TAPS) {
                 let points = lanes(values, place.start as usize + row * stride);
                 for lane in 0..LANES {
-                    column[lane] += down[row] * points[lane];
+                    column[lane] += weight * points[lane];
                 }
             }
             for lane in 0..LANES {

@@ -86,7 +86,7 @@ impl Round<'_> {
             }
             let before = &self.disparity_px[(first + row) * width..][..width];
             let windows = scratch.windows.each_ref().map(Vec::as_slice);
-            solve(windows, samples, level.start_px, before, self.is_last, Solved { disparity_px: to, sigma_px });
+            solve(windows, samples, level.start_px, before, self.is_last, &mut Solved { disparity_px: to, sigma_px });
         }
     }
 

@@ -22,7 +22,7 @@ pub(super) struct Solved<'a> {
 /// With the offset gone (covariances), left = a · warped − p · slope, p = a δ: two normal equations. Written without branches, so that
 /// many pixels are solved at once.
 #[inline(always)]
-pub(super) fn solve(sums: [&[f32]; SUMS], samples: f32, base_px: f32, before: &[f32], is_last: bool, to: Solved<'_>) {
+pub(super) fn solve(sums: [&[f32]; SUMS], samples: f32, base_px: f32, before: &[f32], is_last: bool, to: &mut Solved<'_>) {
     let width = before.len();
     let [l, r, g, ll, rr, gg, lr, lg, rg, start] = sums;
     let (l, r, g, start) = (&l[..width], &r[..width], &g[..width], &start[..width]);

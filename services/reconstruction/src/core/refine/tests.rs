@@ -1,3 +1,5 @@
+use std::f64::consts::TAU;
+
 use opencv::core::{CV_32FC1, Mat, MatTraitManual as _, Scalar};
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -12,9 +14,9 @@ fn texture(x: f64, y: f64) -> f64 {
     let mut random = ChaCha8Rng::seed_from_u64(9);
     let mut level = 120.0;
     for _ in 0..24 {
-        let number = std::f64::consts::TAU / random.random_range(4.0..30.0);
-        let turn: f64 = random.random_range(0.0..6.28);
-        level += 8.0 * (number * (turn.cos() * x + turn.sin() * y) + random.random_range(0.0..6.28)).sin();
+        let number = TAU / random.random_range(4.0..30.0);
+        let turn: f64 = random.random_range(0.0..TAU);
+        level += 8.0 * (number * (turn.cos() * x + turn.sin() * y) + random.random_range(0.0..TAU)).sin();
     }
     level
 }
@@ -102,7 +104,7 @@ fn threads_change_nothing() {
 fn odd_sizes_and_nonsense_do_not_panic() {
     for (width, height) in [(1, 1), (2, 3), (12, 1), (1, 40), (7, 130)] {
         let flat = picture((width, height), |_, _| 3.0);
-        let wild = picture((width, height), |x, _| if x as usize % 2 == 0 { f64::NAN } else { f64::INFINITY });
+        let wild = picture((width, height), |x, _| if (x as usize).is_multiple_of(2) { f64::NAN } else { f64::INFINITY });
         for (left, right) in [(&flat, &flat), (&flat, &wild), (&wild, &wild)] {
             for value in [0.0, f32::NAN, f32::INFINITY, -1e30, 1e30] {
                 let values_px = vec![value; width * height];
