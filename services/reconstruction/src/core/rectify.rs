@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::camera;
 use super::cv;
-use super::resample::{Margined, Place, ROWS_A_TASK, Weights};
+use super::resample::{Row, Warp, shift, warp_row};
 
 /// Why a calibration cannot be rectified.
 #[derive(Debug, thiserror::Error)]
@@ -92,18 +92,20 @@ impl RectifiedRig {
 pub struct Rectifier {
     calibration: RigCalibration,
     rig: RectifiedRig,
-    weights: Weights,
-    margined: Margined,
     left: Side,
     right: Side,
 }
 
 /// One camera: where each rectified pixel comes from, whether that is within the picture, and the last picture, rectified.
 struct Side {
-    places: Vec<Place>,
+    /// As [`Warp`] has them, for each row.
+    down_px: Vec<f32>,
+    across_px: Vec<f32>,
     inside: Vec<bool>,
     grey: Mat,
     exact: Mat,
+    /// One for each task.
+    scratch: Vec<Row>,
 }
 
 impl Side {
@@ -111,27 +113,61 @@ impl Side {
         let (width, height) = (size.width as usize, size.height as usize);
         let (x, y) = (maps.0.data_typed::<f32>()?, maps.1.data_typed::<f32>()?);
         let (right, bottom) = (width as f32 - 0.5, height as f32 - 0.5);
+        let mut down_px = vec![0.0; x.len()];
+        let rows = x.chunks_exact(width).zip(y.chunks_exact(width)).zip(down_px.chunks_exact_mut(width)).enumerate();
+        rows.for_each(|(row, ((x, y), down_px))| columns_meet(row, x, y, height, down_px));
         Ok(Self {
-            places: x.iter().zip(y).map(|(x, y)| Margined::place(*x, *y, width, height)).collect(),
+            down_px,
+            across_px: x.iter().enumerate().map(|(i, x)| shift(i % width, *x, width)).collect(),
             inside: x.iter().zip(y).map(|(x, y)| (-0.5..=right).contains(x) && (-0.5..=bottom).contains(y)).collect(),
             grey: Mat::new_rows_cols_with_default(size.height, size.width, CV_8UC1, Scalar::default())?,
             exact: Mat::new_rows_cols_with_default(size.height, size.width, CV_32FC1, Scalar::default())?,
+            scratch: vec![Row::default(); height.div_ceil(ROWS_A_TASK)],
         })
     }
 
-    fn warp(&mut self, image: &Image, margined: &mut Margined, weights: &Weights) -> opencv::Result<()> {
+    fn warp(&mut self, image: &Image) -> opencv::Result<()> {
         let width = image.width_px() as usize;
-        margined.fill(image.pixels(), width, image.height_px() as usize);
-        let margined = &*margined;
-        let exact = self.exact.data_typed_mut::<f32>()?.par_chunks_mut(width);
-        let rows = self.places.par_chunks(width).zip(exact.zip(self.grey.data_typed_mut::<u8>()?.par_chunks_mut(width)));
-        rows.with_min_len(ROWS_A_TASK).for_each(|(places, (exact, grey))| margined.sample(places, weights, exact, grey));
+        let task = ROWS_A_TASK * width;
+        let exact = self.exact.data_typed_mut::<f32>()?.par_chunks_mut(task);
+        let grey = self.grey.data_typed_mut::<u8>()?.par_chunks_mut(task);
+        let (down_px, across_px) = (&self.down_px, &self.across_px);
+        exact.zip(grey).zip(&mut self.scratch).enumerate().for_each(|(task, ((exact, grey), scratch))| {
+            let rows = exact.chunks_exact_mut(width).zip(grey.chunks_exact_mut(width)).enumerate();
+            for (row, (exact, grey)) in rows.map(|(row, to)| (task * ROWS_A_TASK + row, to)) {
+                let at = row * width..(row + 1) * width;
+                let (down_px, across_px) = (&down_px[at.clone()], &across_px[at]);
+                let warp = Warp { picture: image.pixels(), width, down_px, across_px };
+                warp_row(&warp, row, scratch, exact, grey);
+            }
+        });
         Ok(())
     }
 
     fn memory_bytes(&self) -> usize {
-        let pixels = self.places.len();
-        pixels * (size_of::<Place>() + size_of::<bool>() + size_of::<u8>() + size_of::<f32>())
+        let pixels = self.across_px.len();
+        let scratch: usize = self.scratch.iter().map(Row::memory_bytes).sum();
+        pixels * (3 * size_of::<f32>() + size_of::<bool>() + size_of::<u8>()) + scratch
+    }
+}
+
+/// Rows that are worth another thread.
+const ROWS_A_TASK: usize = 16;
+
+/// For each column of the picture, how far below `row` that row of the rectified picture meets it; `x` and `y` say where the row's pixels
+/// come from. Between two pixels the row is straight, beyond its ends it goes on as it was.
+fn columns_meet(row: usize, x: &[f32], y: &[f32], height: usize, down_px: &mut [f32]) {
+    let mut from = 0;
+    for (column, down_px) in down_px.iter_mut().enumerate() {
+        let column_px = column as f32;
+        while from + 2 < x.len() && x[from + 1] <= column_px {
+            from += 1;
+        }
+        let to = (from + 1).min(x.len() - 1);
+        let (across, down) = (x[to] - x[from], y[to] - y[from]);
+        // Rows run to the right; where a map does not, nothing is known.
+        let slope = if across > 0.1 { down / across } else { 0.0 };
+        *down_px = shift(row, y[from] + slope * (column_px - x[from]), height);
     }
 }
 
@@ -157,7 +193,7 @@ impl Rectifier {
         };
         let [left, right] = maps(calibration, &rectification)?;
         let (left, right) = (Side::new(&left, size)?, Side::new(&right, size)?);
-        Ok(Self { calibration: *calibration, rig, weights: Weights::new(), margined: Margined::default(), left, right })
+        Ok(Self { calibration: *calibration, rig, left, right })
     }
 
     /// The calibration that the maps belong to.
@@ -205,15 +241,15 @@ impl Rectifier {
                 });
             }
         }
-        self.left.warp(left, &mut self.margined, &self.weights)?;
-        self.right.warp(right, &mut self.margined, &self.weights)?;
+        self.left.warp(left)?;
+        self.right.warp(right)?;
         Ok(())
     }
 
     /// How many bytes maps and pictures hold.
     #[must_use]
     pub fn memory_bytes(&self) -> usize {
-        self.margined.memory_bytes() + self.left.memory_bytes() + self.right.memory_bytes()
+        self.left.memory_bytes() + self.right.memory_bytes()
     }
 
     /// The last pair, rectified, left then right, 8-bit: for matchers and people.

@@ -22,15 +22,12 @@ use round::{Round, RoundScratch};
 use smooth::{Smooth, SmoothScratch};
 
 use super::disparity::Disparity;
-use super::resample::{Margined, Weights};
 use super::window::BAND_ROWS;
 
 /// Refines disparity maps of one size; keeps its buffers between calls.
 pub struct Refiner {
     window_px: u32,
     iterations: u32,
-    right: Margined,
-    resampling: Weights,
     start: Vec<f32>,
     next: Vec<f32>,
     scratch: Vec<Scratch>,
@@ -47,15 +44,7 @@ impl Refiner {
     /// With `window_px × window_px` windows (made odd) and this many rounds of correction.
     #[must_use]
     pub fn new(window_px: u32, iterations: u32) -> Self {
-        Self {
-            window_px: window_px | 1,
-            iterations,
-            right: Margined::default(),
-            resampling: Weights::new(),
-            start: Vec::new(),
-            next: Vec::new(),
-            scratch: Vec::new(),
-        }
+        Self { window_px: window_px | 1, iterations, start: Vec::new(), next: Vec::new(), scratch: Vec::new() }
     }
 
     /// Side of the window, pixels: errors of pixels closer than this are correlated.
@@ -68,7 +57,7 @@ impl Refiner {
     #[must_use]
     pub fn memory_bytes(&self) -> usize {
         let bands: usize = self.scratch.iter().map(|s| s.smooth.memory_bytes() + s.round.memory_bytes()).sum();
-        self.right.memory_bytes() + bands + size_of::<f32>() * (self.start.capacity() + self.next.capacity())
+        bands + size_of::<f32>() * (self.start.capacity() + self.next.capacity())
     }
 
     /// Refines `disparity` against the rectified pictures (`f32`) that it came from, and fills `sigma_px` with one standard
@@ -89,7 +78,6 @@ impl Refiner {
         if left.is_empty() {
             return Ok(());
         }
-        self.right.fill(right, width, height);
         self.scratch.resize_with(height.div_ceil(BAND_ROWS), Scratch::default);
         self.start.clone_from(&disparity.values_px);
         self.next.resize(left.len(), f32::NAN);
@@ -107,8 +95,7 @@ impl Refiner {
         for iteration in 0..self.iterations {
             let round = Round {
                 left,
-                right: &self.right,
-                resampling: &self.resampling,
+                right,
                 disparity_px: &disparity.values_px,
                 width,
                 height,

@@ -1,14 +1,13 @@
 //! One round of correction: warp, multiply, sum, solve.
 
 use super::solve::{SUMS, Solved, solve};
-use crate::core::resample::{Margined, Weights};
+use crate::core::resample::{self, shift, shifted};
 use crate::core::window::{BAND_ROWS, mirror_ends, mirrored, sums};
 
 /// What a round works on.
 pub(super) struct Round<'a> {
     pub(super) left: &'a [f32],
-    pub(super) right: &'a Margined,
-    pub(super) resampling: &'a Weights,
+    pub(super) right: &'a [f32],
     /// From before the round.
     pub(super) disparity_px: &'a [f32],
     pub(super) width: usize,
@@ -39,6 +38,9 @@ impl Row {
 #[derive(Default)]
 pub(super) struct RoundScratch {
     rows: Vec<Row>,
+    /// A row of the right picture, and where it is sampled.
+    right: resample::Row,
+    shift_px: Vec<f32>,
     columns: [Vec<f32>; SUMS],
     windows: [Vec<f32>; SUMS],
     powers: [Vec<f32>; 2],
@@ -48,7 +50,7 @@ impl RoundScratch {
     pub(super) fn memory_bytes(&self) -> usize {
         let rows: usize = self.rows.iter().map(|row| 4 * row.left.capacity()).sum();
         let sums: usize = self.columns.iter().chain(&self.windows).chain(&self.powers).map(Vec::capacity).sum();
-        size_of::<f32>() * (rows + sums)
+        size_of::<f32>() * (rows + sums + self.shift_px.capacity()) + self.right.memory_bytes()
     }
 }
 
@@ -68,6 +70,8 @@ impl Round<'_> {
         let level = self.level(first..first + to.len() / width);
         scratch.rows.resize_with(self.window + 1, Row::default);
         scratch.rows.iter_mut().for_each(|row| row.resize(width));
+        scratch.right.resize(width);
+        scratch.shift_px.resize(width, 0.0);
         for columns in &mut scratch.columns {
             columns.clear();
             columns.resize(width + 2 * half, 0.0);
@@ -108,7 +112,8 @@ impl Round<'_> {
     fn slide(&self, top: isize, number: usize, level: Level, scratch: &mut RoundScratch) {
         let at = mirrored(top + number as isize, self.height);
         let slots = self.window + 1;
-        self.fill(at, level, &mut scratch.rows[number % slots]);
+        let RoundScratch { rows, right, shift_px, .. } = scratch;
+        self.fill(at, level, &mut rows[number % slots], right, shift_px);
         // Zeros, until the window is full.
         let (new, old) = (&scratch.rows[number % slots], &scratch.rows[(number + 1) % slots]);
         let half = self.window / 2;
@@ -133,7 +138,7 @@ impl Round<'_> {
     /// Warps the right picture onto the left one by the disparity so far. Holes take the nearest disparity on their left (the first,
     /// at the edge): windows beside them must not compare the wrong water.
     #[inline(always)]
-    fn fill(&self, at: usize, level: Level, row: &mut Row) {
+    fn fill(&self, at: usize, level: Level, row: &mut Row, right: &mut resample::Row, shift_px: &mut [f32]) {
         let width = self.width;
         let values = &self.disparity_px[at * width..][..width];
         let mut last = values.iter().copied().find(|px| px.is_finite()).unwrap_or_else(|| self.near(at, level.start_px));
@@ -141,7 +146,14 @@ impl Round<'_> {
             last = if value.is_nan() { last } else { *value };
             *whole = last;
         }
-        self.right.sample_row(at, &row.start_px, level.right, self.resampling, &mut row.warped);
+        for (to, from) in right.values_mut().iter_mut().zip(&self.right[at * width..][..width]) {
+            *to = from - level.right;
+        }
+        right.repeat_ends();
+        for (x, (to, start_px)) in shift_px.iter_mut().zip(&row.start_px).enumerate() {
+            *to = shift(x, x as f32 - start_px, width);
+        }
+        shifted(right, shift_px, &mut row.warped);
         for (left, value) in row.left.iter_mut().zip(&self.left[at * width..][..width]) {
             *left = value - level.left;
         }
