@@ -7,7 +7,7 @@ use halcyon_reconstruction::core::matcher::{DisparityRange, Engine};
 use halcyon_reconstruction::core::plane::DisparityPlane;
 use halcyon_reconstruction::core::reconstruct::{Reconstructor, Settings};
 use halcyon_reconstruction::core::rectify::Rectifier;
-use halcyon_reconstruction::core::refine::Refiner;
+use halcyon_reconstruction::core::refine::{Every, Refined, Refiner};
 use halcyon_sim::rig::RigConfig;
 use halcyon_sim::sea::SeaConfig;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -26,10 +26,10 @@ fn main() {
         pool.run(|| {
             let mut rectifier = Rectifier::new(&pair.calibration).unwrap();
             let mut matcher = Engine::Guided.matcher(9);
-            let mut refiner = Refiner::new(11, 2);
+            let mut refiner = Refiner::new(11, 2, Every::SecondPixel);
             let mut chain = Reconstructor::new(Settings { cell_m: 0.04, fixed_rig: true, range, ..Settings::default() });
             let mut disparity = Disparity::default();
-            let mut sigma = Vec::new();
+            let mut refined = Refined::default();
             let mut times = vec![Vec::new(); 4];
             for _ in 0..40 {
                 times[0].push(spent(|| rectifier.rectify(&pair.left, &pair.right).unwrap()).1.wall_ms);
@@ -37,7 +37,7 @@ fn main() {
                 matcher.guide(Some(DisparityPlane::level((47.4 * scale) as f32)));
                 times[1].push(spent(|| matcher.compute(l, r, range, &mut disparity).unwrap()).1.wall_ms);
                 let (l, r) = rectifier.exact();
-                times[2].push(spent(|| refiner.refine(l, r, &mut disparity, &mut sigma).unwrap()).1.wall_ms);
+                times[2].push(spent(|| refiner.refine(l, r, &disparity, &mut refined).unwrap()).1.wall_ms);
                 times[3].push(spent(|| chain.reconstruct(&pair).unwrap()).1.wall_ms);
             }
             println!(

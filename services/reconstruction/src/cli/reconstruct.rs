@@ -98,7 +98,7 @@ pub fn reconstruct_pair(
         series.push(&patch)?;
         options.write_series(series, &calibration)?;
     }
-    Ok(ReconstructReport::new(chain.engine, frame, &patch, chain.reconstructor.disparity(), timing))
+    Ok(ReconstructReport::new(chain.engine, frame, &patch, &chain.reconstructor.disparity(), timing))
 }
 
 /// Gravity where the pair has a pose, otherwise the plane's own.
@@ -172,7 +172,7 @@ impl ReconstructOptions {
         if let Some(path) = &self.disparity {
             let disparity = reconstructor.disparity();
             let as_pfm = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("pfm"));
-            let bytes = if as_pfm { pfm::encode(disparity) } else { colour::encode_png(disparity)? };
+            let bytes = if as_pfm { pfm::encode(&disparity) } else { colour::encode_png(&disparity)? };
             write_bytes(path, &bytes)?;
         }
         if self.cloud.is_none() && self.mesh.is_none() {

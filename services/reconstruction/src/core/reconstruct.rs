@@ -19,7 +19,7 @@ use super::grid::{GridError, Gridder, Sampling, SurfacePoint, remove_mean};
 use super::matcher::{DisparityRange, Engine, MatchError, Matcher};
 use super::plane::{self, DisparityPlane, Match, PlaneError};
 use super::rectify::{RectifiedRig, Rectifier, RectifyError};
-use super::refine::Refiner;
+use super::refine::{Every, Refined, Refiner};
 use super::scatter::Scatter;
 use super::tilt::{TiltCorrection, TiltFilter};
 
@@ -127,7 +127,7 @@ pub struct Reconstructor {
     /// Level of the last patch above the datum, metres: where the autopilot's height has wandered to.
     level_m: f64,
     disparity: Disparity,
-    sigma_px: Vec<f32>,
+    refined: Refined,
     matches: Vec<Match>,
     /// The matches of so many rows each.
     bands: Vec<Vec<Match>>,
@@ -145,7 +145,9 @@ impl Reconstructor {
     /// With these settings.
     #[must_use]
     pub fn new(settings: Settings) -> Self {
-        let refiner = (settings.refine_window_px > 0).then(|| Refiner::new(settings.refine_window_px, REFINE_ROUNDS));
+        // Only points need a disparity.
+        let every = if settings.point_stride_px.is_multiple_of(2) { Every::SecondPixel } else { Every::Pixel };
+        let refiner = (settings.refine_window_px > 0).then(|| Refiner::new(settings.refine_window_px, REFINE_ROUNDS, every));
         Self {
             matcher: settings.engine.matcher(settings.block_px),
             refiner,
@@ -157,7 +159,7 @@ impl Reconstructor {
             mount: FixedMount::default(),
             level_m: 0.0,
             disparity: Disparity::default(),
-            sigma_px: Vec::new(),
+            refined: Refined::default(),
             matches: Vec::new(),
             bands: Vec::new(),
             points: Vec::new(),
@@ -237,14 +239,14 @@ impl Reconstructor {
             stamp: *stamp,
             rig: rig.clone(),
             left_jpeg: left_jpeg.to_vec().into(),
-            disparity_png: colour::encode_png(&self.disparity)?.into(),
+            disparity_png: colour::encode_png(&self.disparity())?.into(),
         }))
     }
 
-    /// The disparity of the last pair, refined.
+    /// The disparity of the last pair, refined; pixels between those that became points are interpolated.
     #[must_use]
-    pub fn disparity(&self) -> &Disparity {
-        &self.disparity
+    pub fn disparity(&self) -> Disparity {
+        self.refined.full(self.disparity.width_px, self.disparity.height_px)
     }
 
     /// The matches of the last pair that belong to the water, row by row; outliers are gone.
@@ -274,7 +276,8 @@ impl Reconstructor {
     /// How many bytes the chain's own buffers hold.
     #[must_use]
     pub fn memory_bytes(&self) -> usize {
-        let floats = self.disparity.values_px.capacity() + self.sigma_px.capacity();
+        let refined = self.refined.disparity.values_px.capacity() + self.refined.sigma_px.capacity();
+        let floats = self.disparity.values_px.capacity() + refined;
         size_of::<f32>() * floats
             + size_of::<Match>() * (2 * self.matches.capacity())
             + size_of::<SurfacePoint>() * self.points.capacity()
@@ -362,24 +365,29 @@ impl Reconstructor {
         match &mut self.refiner {
             Some(refiner) => {
                 let (left, right) = rectifier.exact();
-                refiner.refine(left, right, &mut self.disparity, &mut self.sigma_px)?;
+                refiner.refine(left, right, &self.disparity, &mut self.refined)?;
             }
             None => {
-                self.sigma_px.clear();
-                self.sigma_px.resize(self.disparity.values_px.len(), SIGMA_UNREFINED_PX);
+                self.refined.every = Every::Pixel;
+                self.refined.disparity.clone_from(&self.disparity);
+                self.refined.sigma_px.clear();
+                self.refined.sigma_px.resize(self.disparity.values_px.len(), SIGMA_UNREFINED_PX);
             }
         }
-        let stride = self.settings.point_stride_px.max(1) as usize;
+        let step = self.refined.every.step_px();
+        let stride = self.settings.point_stride_px.max(1) as usize / step;
         // What a window saw beyond an edge was invented.
         let margin_px = self.window_px() / 2;
-        let (disparity, sigma_px, width) = (&self.disparity, &self.sigma_px, rig.width_px as usize);
-        let rows: Vec<u32> = (0..rig.height_px).step_by(stride).collect();
+        let (disparity, sigma_px) = (&self.refined.disparity, &self.refined.sigma_px);
+        let width = disparity.width_px as usize;
+        let rows: Vec<u32> = (0..disparity.height_px).step_by(stride).collect();
         self.bands.resize_with(rows.len().div_ceil(ROWS_A_BAND), Vec::new);
         rows.par_chunks(ROWS_A_BAND).zip(&mut self.bands).for_each(|(rows, band)| {
             band.clear();
-            for y in rows.iter().copied() {
-                let row = disparity.row(y).iter().zip(&sigma_px[y as usize * width..]).enumerate();
-                for (x, (disparity_px, sigma_px)) in row.step_by(stride).map(|(x, (d, s))| (x as u32, (*d, *s))) {
+            for row in rows.iter().copied() {
+                let y = row * step as u32;
+                let row = disparity.row(row).iter().zip(&sigma_px[row as usize * width..]).enumerate();
+                for (x, (disparity_px, sigma_px)) in row.step_by(stride).map(|(x, (d, s))| ((x * step) as u32, (*d, *s))) {
                     // Comparisons with NaN are false: what was not matched stays out.
                     if disparity_px > 0.0 && sigma_px <= SIGMA_MAX_PX && rectifier.is_seen(x, y, disparity_px, margin_px) {
                         band.push(Match { x_px: x as f32, y_px: y as f32, disparity_px, sigma_px });

@@ -66,7 +66,6 @@ struct Scratch {
     /// For each residual, sums of costs down the columns of the window, and over the window.
     columns: Vec<Vec<u16>>,
     windows: Vec<Vec<u16>>,
-    powers: [Vec<u16>; 2],
     best: Vec<u16>,
     winner: Vec<u16>,
     /// Costs of the winner's neighbours.
@@ -203,10 +202,10 @@ impl Job<'_> {
         for (row, to) in to.chunks_exact_mut(self.width).enumerate() {
             let row = first + row as isize;
             self.slide(row + half as isize, true, scratch);
-            let Scratch { columns, windows, powers, .. } = scratch;
+            let Scratch { columns, windows, .. } = scratch;
             for (columns, windows) in columns.iter_mut().zip(windows) {
                 mirror_ends(columns, half);
-                sums(columns, self.window, powers, windows);
+                sums(columns, self.window, windows);
             }
             self.find_runs(row as usize, scratch);
             self.look_back(scratch);
