@@ -89,9 +89,10 @@ impl Gridder {
         }
         let (rows, cols) = (rows as usize, cols as usize);
         let cell_of = |point: &SurfacePoint| {
-            let row = ((point.north_m / cell_m).floor() - first_row) as usize;
-            let col = ((point.east_m / cell_m).floor() - first_col) as usize;
-            row * cols + col
+            // Nothing is negative here, so that cutting off is rounding down.
+            let row = (point.north_m / cell_m - first_row) as usize;
+            let col = (point.east_m / cell_m - first_col) as usize;
+            row.min(rows - 1) * cols + col.min(cols - 1)
         };
         self.sort_by_cell(points, rows * cols, cell_of);
 
@@ -160,25 +161,28 @@ impl Gridder {
 /// Mean of (value, sigma) pairs, weighted by 1/sigma², without what stands out from the median; and the typical sigma of one
 /// value that went in (the root of the weighted mean square).
 fn robust_mean(values: &[(f32, f32)], scratch: &mut Vec<f32>) -> (f32, f32) {
-    let mut median_of = |values: &mut dyn Iterator<Item = f32>| {
-        scratch.clear();
-        scratch.extend(values);
-        let middle = scratch.len() / 2;
-        *scratch.select_nth_unstable_by(middle, f32::total_cmp).1
-    };
-    let median = median_of(&mut values.iter().map(|(value, _)| *value));
-    let deviation = median_of(&mut values.iter().map(|(value, _)| (value - median).abs())) / 0.6745;
+    scratch.clear();
+    scratch.extend(values.iter().map(|(value, _)| *value));
+    let median = median(scratch);
+    scratch.iter_mut().for_each(|value| *value = (*value - median).abs());
+    let deviation = self::median(scratch) / 0.6745;
     let (mut weights, mut sum, mut variances) = (0.0_f64, 0.0_f64, 0.0_f64);
     for (value, sigma) in values {
         // A point is never left out for less than its own uncertainty.
         if (value - median).abs() <= OUTLIER_SIGMAS * deviation.max(*sigma) {
-            let weight = 1.0 / f64::from(*sigma).powi(2).max(1e-12);
+            let variance = f64::from(*sigma) * f64::from(*sigma);
+            let weight = 1.0 / variance.max(1e-12);
             weights += weight;
             sum += weight * f64::from(value - median);
-            variances += weight * f64::from(*sigma).powi(2);
+            variances += weight * variance;
         }
     }
     ((f64::from(median) + sum / weights) as f32, (variances / weights).sqrt() as f32)
+}
+
+fn median(values: &mut [f32]) -> f32 {
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f32::total_cmp).1
 }
 
 /// How much smaller the standard deviation of a cell's mean is than that of one point, when each point is itself a mean over a

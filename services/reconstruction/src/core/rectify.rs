@@ -220,8 +220,8 @@ impl Rectifier {
             let (from_px, to_px) = (at_px - margin_px, (at_px + margin_px).min(last_px));
             from_px >= 0.0
                 && from_px <= last_px
-                && side.inside[row + from_px.round() as usize]
-                && side.inside[row + to_px.round() as usize]
+                && side.inside[row + (from_px + 0.5) as usize]
+                && side.inside[row + (to_px + 0.5) as usize]
         };
         within(&self.right, right_px) && within(&self.left, (x_px as f32).max(margin_px))
     }
