@@ -142,11 +142,11 @@ impl Lanes {
     #[inline(always)]
     fn next_whole(&mut self) -> Option<i32> {
         let after = self.whole.unwrap_or(i32::MIN);
-        let mut next = i32::MAX;
-        for whole in self.wholes {
-            let candidate = if whole > after { whole } else { i32::MAX };
-            next = if candidate < next { candidate } else { next };
+        let mut larger = [i32::MAX; LANES];
+        for lane in 0..LANES {
+            larger[lane] = if self.wholes[lane] > after { self.wholes[lane] } else { i32::MAX };
         }
+        let next = least(larger);
         self.whole = (next != i32::MAX).then_some(next);
         self.whole
     }
@@ -169,6 +169,19 @@ impl Lanes {
 fn small_whole(whole: f32) -> i32 {
     const MAGIC: f32 = 12_582_912.0;
     ((whole + MAGIC).to_bits() as i32).wrapping_sub(MAGIC.to_bits() as i32)
+}
+
+/// Written as a tree, which stays in vectors.
+#[inline(always)]
+fn least(x: [i32; LANES]) -> i32 {
+    let (mut eight, mut four) = ([0; 8], [0; 4]);
+    for lane in 0..8 {
+        eight[lane] = x[lane].min(x[lane + 8]);
+    }
+    for lane in 0..4 {
+        four[lane] = eight[lane].min(eight[lane + 4]);
+    }
+    (four[0].min(four[2])).min(four[1].min(four[3]))
 }
 
 #[inline(always)]
