@@ -4,6 +4,7 @@ use halcyon::accuracy::{Scene, thesis_rig};
 use halcyon_reconstruction::cli::{Threads, spent};
 use halcyon_reconstruction::core::disparity::Disparity;
 use halcyon_reconstruction::core::matcher::{DisparityRange, Engine};
+use halcyon_reconstruction::core::peer::OpenCvChain;
 use halcyon_reconstruction::core::plane::DisparityPlane;
 use halcyon_reconstruction::core::reconstruct::{Reconstructor, Settings};
 use halcyon_reconstruction::core::rectify::Rectifier;
@@ -30,7 +31,8 @@ fn main() {
             let mut chain = Reconstructor::new(Settings { cell_m: 0.04, fixed_rig: true, range, ..Settings::default() });
             let mut disparity = Disparity::default();
             let mut refined = Refined::default();
-            let mut times = vec![Vec::new(); 4];
+            let mut times = vec![Vec::new(); 5];
+            let mut peer = OpenCvChain::new(&pair.calibration, range, 5).unwrap();
             for _ in 0..40 {
                 times[0].push(spent(|| rectifier.rectify(&pair.left, &pair.right).unwrap()).1.wall_ms);
                 let (l, r) = rectifier.grey();
@@ -39,14 +41,19 @@ fn main() {
                 let (l, r) = rectifier.exact();
                 times[2].push(spent(|| refiner.refine(l, r, &disparity, &mut refined).unwrap()).1.wall_ms);
                 times[3].push(spent(|| chain.reconstruct(&pair).unwrap()).1.wall_ms);
+                if times[4].len() < 10 {
+                    times[4].push(spent(|| peer.points(&pair.left, &pair.right).unwrap()).1.wall_ms);
+                }
             }
             println!(
-                "{threads} threads, guided {}: rectify {:.2}, match {:.2}, refine {:.2}, all {:.2} ms; {} MiB",
+                "{threads} threads, guided {}: rectify {:.2}, match {:.2}, refine {:.2}, all {:.2} ms, of OpenCV's {:.2} ({:.1} x); {} MiB",
                 matcher.was_guided(),
                 least(&times[0]),
                 least(&times[1]),
                 least(&times[2]),
                 least(&times[3]),
+                least(&times[4]),
+                least(&times[4]) / least(&times[3]),
                 chain.memory_bytes() >> 20
             );
         })

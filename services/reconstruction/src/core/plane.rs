@@ -20,7 +20,7 @@ const HYPOTHESES: usize = 96;
 /// Points that a hypothesis is judged by.
 const JUDGES: usize = 512;
 /// Points that say where the middle of all is; the last word is that of every point that belongs.
-const SAMPLE: usize = 8192;
+const SAMPLE: usize = 4096;
 /// Points that one task sums up. Fixed, so that rounding does not depend on how many threads there are.
 const CHUNK: usize = 8192;
 /// Points further from the plane than this many robust standard deviations are outliers. A Gaussian sea has crests of four.

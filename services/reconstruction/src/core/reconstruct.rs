@@ -74,6 +74,8 @@ pub(crate) const REFINE_ROUNDS: u32 = 2;
 const SIGMA_MAX_PX: f32 = 0.5;
 /// Points that one task works through.
 const POINTS_A_CHUNK: usize = 4096;
+/// Pixels that one task counts.
+const PIXELS_A_CHUNK: usize = 1 << 18;
 /// Rows of matches that one task collects.
 const ROWS_A_BAND: usize = 32;
 /// With fewer of the pixels matched than this the search range was wrong, or there was nothing to see.
@@ -358,7 +360,7 @@ impl Reconstructor {
         self.matcher.guide(guide);
         self.matcher.compute(left, right, range, &mut self.disparity)?;
         let enough = (DENSITY_MIN * self.disparity.values_px.len() as f64) as usize;
-        let matched = self.disparity.values_px.par_chunks(POINTS_A_CHUNK).map(finite).sum::<usize>();
+        let matched = self.disparity.values_px.par_chunks(PIXELS_A_CHUNK).map(finite).sum::<usize>();
         if matched < enough {
             return Err(PlaneError::TooFewPoints { points: matched, needed: enough }.into());
         }
@@ -385,12 +387,16 @@ impl Reconstructor {
         rows.par_chunks(ROWS_A_BAND).zip(&mut self.bands).for_each(|(rows, band)| {
             band.clear();
             for row in rows.iter().copied() {
-                let y = row * step as u32;
-                let row = disparity.row(row).iter().zip(&sigma_px[row as usize * width..]).enumerate();
-                for (x, (disparity_px, sigma_px)) in row.step_by(stride).map(|(x, (d, s))| ((x * step) as u32, (*d, *s))) {
+                let Some(seen) = rectifier.seen(row * step as u32, margin_px) else { continue };
+                let y_px = (row as usize * step) as f32;
+                let sigmas_px = &sigma_px[row as usize * width..][..width];
+                let disparities_px = disparity.row(row);
+                for col in (0..width).step_by(stride) {
+                    let (disparity_px, sigma_px) = (disparities_px[col], sigmas_px[col]);
+                    let x = (col * step) as u32;
                     // Comparisons with NaN are false: what was not matched stays out.
-                    if disparity_px > 0.0 && sigma_px <= SIGMA_MAX_PX && rectifier.is_seen(x, y, disparity_px, margin_px) {
-                        band.push(Match { x_px: x as f32, y_px: y as f32, disparity_px, sigma_px });
+                    if disparity_px > 0.0 && sigma_px <= SIGMA_MAX_PX && seen.has(x, disparity_px) {
+                        band.push(Match { x_px: x as f32, y_px, disparity_px, sigma_px });
                     }
                 }
             }
@@ -414,17 +420,24 @@ impl Reconstructor {
             let sigma_m = f64::from(m.sigma_px) * depth_m / disparity_px * along_normal;
             SurfacePoint { north_m: ned_m.x, east_m: ned_m.y, up_m: -ned_m.z as f32, sigma_m: sigma_m as f32 }
         };
-        self.matches.par_iter().with_min_len(POINTS_A_CHUNK).map(place).collect_into_vec(&mut self.points);
-        let sum = |points: &[SurfacePoint]| {
-            points.iter().fold(Vector3::zeros(), |sum, point| sum + Vector3::new(point.north_m, point.east_m, 0.0))
-        };
+        let none = SurfacePoint { north_m: 0.0, east_m: 0.0, up_m: 0.0, sigma_m: 0.0 };
+        self.points.resize(self.matches.len(), none);
+        let chunks = self.matches.par_chunks(POINTS_A_CHUNK).zip(self.points.par_chunks_mut(POINTS_A_CHUNK));
         // Sums of fixed chunks: rounding does not depend on how many threads there are.
-        let sums: Vec<Vector3<f64>> = self.points.par_chunks(POINTS_A_CHUNK).map(sum).collect();
-        let depths = |matches: &[Match]| matches.iter().map(|m| focal_baseline / f64::from(m.disparity_px)).sum();
-        let depths_m: Vec<f64> = self.matches.par_chunks(POINTS_A_CHUNK).map(depths).collect();
+        let sums: Vec<Vector3<f64>> = chunks
+            .map(|(matches, points)| {
+                let mut sum = Vector3::zeros();
+                for (m, point) in matches.iter().zip(points) {
+                    *point = place(m);
+                    sum += Vector3::new(point.north_m, point.east_m, focal_baseline / f64::from(m.disparity_px));
+                }
+                sum
+            })
+            .collect();
+        let sum = sums.iter().sum::<Vector3<f64>>();
         let count = self.points.len().max(1) as f64;
-        self.centre = sums.iter().sum::<Vector3<f64>>().xy() / count;
-        self.mean_depth_m = depths_m.iter().sum::<f64>() / count;
+        self.centre = sum.xy() / count;
+        self.mean_depth_m = sum.z / count;
         let pixel_m = self.mean_depth_m / rig.focal_px;
         let window_px = self.window_px();
         Sampling {
@@ -483,7 +496,8 @@ impl Reconstructor {
             let disparity_px = rig.focal_px * rig.baseline_m / seen.z;
             if seen.z > 0.0
                 && inside
-                && rectifier.is_seen(x_px.round() as u32, y_px.round() as u32, disparity_px as f32, self.window_px() / 2)
+                && let Some(seen) = rectifier.seen(y_px.round() as u32, self.window_px() / 2)
+                && seen.has(x_px.round() as u32, disparity_px as f32)
             {
                 in_view += 1;
                 measured += u32::from(elevation.is_finite());

@@ -171,6 +171,32 @@ fn columns_meet(row: usize, x: &[f32], y: &[f32], height: usize, down_px: &mut [
     }
 }
 
+/// See [`Rectifier::seen`].
+#[derive(Debug, Clone, Copy)]
+pub struct SeenRow<'a> {
+    left: &'a [bool],
+    right: &'a [bool],
+    margin_px: f32,
+}
+
+impl SeenRow<'_> {
+    /// Whether both cameras saw what a match claims: pixel `x_px` of the left picture and, `disparity_px` further left, of the right one.
+    #[must_use]
+    #[inline]
+    pub fn has(&self, x_px: u32, disparity_px: f32) -> bool {
+        let x_px = x_px as f32;
+        self.is_inside(self.right, x_px - disparity_px) && self.is_inside(self.left, x_px.max(self.margin_px))
+    }
+
+    #[inline]
+    fn is_inside(&self, row: &[bool], at_px: f32) -> bool {
+        let (from_px, to_px) = (at_px - self.margin_px, (at_px + self.margin_px).min((row.len() - 1) as f32));
+        let is_inside = |at_px: f32| row.get((at_px + 0.5) as usize).copied().unwrap_or_default();
+        // NaN is not positive.
+        from_px >= 0.0 && is_inside(from_px) && is_inside(to_px)
+    }
+}
+
 impl Rectifier {
     /// Computes the maps.
     ///
@@ -208,22 +234,17 @@ impl Rectifier {
         &self.rig
     }
 
-    /// Whether both cameras saw what a match claims: pixel (x, y) of the left rectified picture and, `disparity_px` further
-    /// left, of the right one, with `margin_px` around it along the row. Beyond the edges of a picture, warping invents pixels.
+    /// What both cameras saw of row `y_px` of the rectified pictures, with `margin_px` to both sides along the row: beyond the edges of a
+    /// picture, warping invents pixels. `None` below the last row.
     #[must_use]
-    pub fn is_seen(&self, x_px: u32, y_px: u32, disparity_px: f32, margin_px: u32) -> bool {
-        let row = y_px as usize * self.rig.width_px as usize;
-        let last_px = (self.rig.width_px - 1) as f32;
-        let right_px = x_px as f32 - disparity_px;
-        let margin_px = margin_px as f32;
-        let within = |side: &Side, at_px: f32| {
-            let (from_px, to_px) = (at_px - margin_px, (at_px + margin_px).min(last_px));
-            from_px >= 0.0
-                && from_px <= last_px
-                && side.inside[row + (from_px + 0.5) as usize]
-                && side.inside[row + (to_px + 0.5) as usize]
-        };
-        within(&self.right, right_px) && within(&self.left, (x_px as f32).max(margin_px))
+    pub fn seen(&self, y_px: u32, margin_px: u32) -> Option<SeenRow<'_>> {
+        let width = self.rig.width_px as usize;
+        let from = y_px as usize * width;
+        Some(SeenRow {
+            left: self.left.inside.get(from..from + width)?,
+            right: self.right.inside.get(from..from + width)?,
+            margin_px: margin_px as f32,
+        })
     }
 
     /// Warps a pair. The results live in the rectifier until the next call.
@@ -241,9 +262,8 @@ impl Rectifier {
                 });
             }
         }
-        self.left.warp(left)?;
-        self.right.warp(right)?;
-        Ok(())
+        let (one, other) = rayon::join(|| self.left.warp(left), || self.right.warp(right));
+        Ok(one.and(other)?)
     }
 
     /// How many bytes maps and pictures hold.

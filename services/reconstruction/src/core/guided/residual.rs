@@ -128,12 +128,16 @@ impl Residual {
 
     /// Takes the slopes of a pair.
     pub(super) fn prepare(&mut self, pair: &Pair<'_>) {
-        for (picture, slopes) in [pair.left, pair.right].into_iter().zip(&mut self.slopes) {
-            slopes.resize(picture.len(), 0);
-            slopes.par_chunks_mut(BAND_ROWS * pair.width).enumerate().for_each(|(band, to)| {
-                slopes_of(picture, pair.width, pair.height, band * BAND_ROWS, to);
-            });
+        let [left, right] = &mut self.slopes;
+        let (width, height) = (pair.width, pair.height);
+        for slopes in [&mut *left, &mut *right] {
+            slopes.resize(width * height, 0);
         }
+        let bands = left.par_chunks_mut(BAND_ROWS * width).zip(right.par_chunks_mut(BAND_ROWS * width)).enumerate();
+        bands.for_each(|(band, (left, right))| {
+            slopes_of(pair.left, width, height, band * BAND_ROWS, left);
+            slopes_of(pair.right, width, height, band * BAND_ROWS, right);
+        });
     }
 
     /// Matches the pair that was prepared within `reach_px` of `plane`; NaN where the winner is doubtful, at an end, or out of `range`.
