@@ -17,7 +17,7 @@ use halcyon_reconstruction::cli::{
 };
 use halcyon_reconstruction::core::features::FeatureError;
 use halcyon_reconstruction::core::self_calibrate::SelfCalibrateError;
-use halcyon_reconstruction::files::FileError;
+use halcyon_reconstruction::files::{FileError, OutputError};
 use nalgebra::Rotation3;
 use support::samples;
 use support::scene::{default_rig, pose, render};
@@ -179,7 +179,10 @@ fn bad_input_to_self_calibrate_is_named() {
     assert!(as_rig.is_ok(), "{as_rig:?}");
     let options = SelfCalibrateOptions { rig: &picture, ..options_of("left", "right") };
     assert!(matches!(cli::self_calibrate(&options, &mut |_, _| {}), Err(E::Rig(_))));
-    assert!(matches!(with(&|o| o.out = Some(Path::new("/nowhere/new.yaml"))), Err(E::File(FileError::Output(OutputError::NoFolder { .. })))));
+    assert!(matches!(
+        with(&|o| o.out = Some(Path::new("/nowhere/new.yaml"))),
+        Err(E::File(FileError::Output(OutputError::NoFolder { .. })))
+    ));
 }
 
 fn options_of<'a>(left: &'a str, right: &'a str) -> SelfCalibrateOptions<'a> {
@@ -258,7 +261,8 @@ fn features_of_a_pair_with_and_without_its_rig() {
     let blank = bent.path("blank.pgm");
     write_pgm(&blank, &Image::new(320, 240, vec![90; 320 * 240].into()).unwrap());
     let (picture, none) = (bent.path("blank.png"), bent.path("none.ply"));
-    let nothing = FeaturesOptions { rig: Some(&rig), out: Some(&picture), cloud: Some(&none), ..features_options(&blank, &blank) };
+    let nothing =
+        FeaturesOptions { rig: Some(&rig), out: Some(&picture), cloud: Some(&none), ..features_options(&blank, &blank) };
     let report = cli::features(&nothing).unwrap();
     assert_eq!((report.files, report.missing[0].path.clone()), (vec![picture], none.clone()));
     assert!(!none.exists() && report.missing[0].why.starts_with("no epipolar geometry"));
@@ -284,7 +288,10 @@ fn bad_input_to_features_is_named() {
     }
     assert!(matches!(run(&|o| o.cloud = Some(Path::new("a.ply"))), Err(E::CloudWithoutRig)));
     assert!(matches!(run(&|o| o.out = Some(Path::new("a.jpg"))), Err(E::File(FileError::Output(OutputError::Ending { .. })))));
-    assert!(matches!(run(&|o| o.out = Some(Path::new("/nowhere/a.png"))), Err(E::File(FileError::Output(OutputError::NoFolder { .. })))));
+    assert!(matches!(
+        run(&|o| o.out = Some(Path::new("/nowhere/a.png"))),
+        Err(E::File(FileError::Output(OutputError::NoFolder { .. })))
+    ));
     assert!(matches!(run(&|o| o.left = Path::new("/nowhere.png")), Err(E::File(FileError::Read { .. }))));
     assert!(matches!(run(&|o| o.rig = Some(Path::new("/nowhere.yaml"))), Err(E::Rig(_))));
     let small = bent.path("small.pgm");

@@ -10,7 +10,7 @@ use halcyon_model::{Image, PoseAtExposure, StereoPair, rig_yaml};
 use halcyon_reconstruction::cli::{
     FailedPair, MeshOf, ReconstructCliError, ReconstructOptions, SurveyFrame, given_pose, reconstruct_pair, reconstruct_survey,
 };
-use halcyon_reconstruction::files::{FileError, RigFileError};
+use halcyon_reconstruction::files::{FileError, OutputError, RigFileError};
 use support::scene::{default_rig, pose, render};
 
 fn options() -> ReconstructOptions {
@@ -151,7 +151,11 @@ fn a_survey_names_its_bad_pairs_and_goes_on() {
     let names: Vec<_> = report.failed.iter().map(|failed| failed.name.as_str()).collect();
     assert_eq!(names, ["1", "2"]);
     assert!(report.failed[0].why.contains("l1.pgm is a damaged PBM, PGM or PPM"), "{:?}", report.failed);
-    assert!(report.failed[1].why.starts_with("no texture in ") && report.failed[1].why.contains("r2.pgm"), "{:?}", report.failed);
+    assert!(
+        report.failed[1].why.starts_with("no texture in ") && report.failed[1].why.contains("r2.pgm"),
+        "{:?}",
+        report.failed
+    );
     assert!((report.duration_s - 3.0).abs() < 1e-9 && (report.plane.distance_m - 5.0).abs() < 2e-3);
     assert_eq!(heard, [(0, 4, false), (1, 4, false), (2, 4, true), (3, 4, true), (4, 4, false)]);
     let file = netcdf::open(scene.path("g.nc")).unwrap();

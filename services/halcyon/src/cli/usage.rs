@@ -59,7 +59,10 @@ mod tests {
     #[test]
     fn every_mistake_is_one_line_that_says_where_to_read_on() {
         let missing = line(&["rig"]);
-        assert!(missing.contains("--fov-deg <DEG>, --width <PX>") && missing.ends_with("see 'halcyon rig --help'"), "{missing}");
+        assert!(
+            missing.contains("--fov-deg <DEG>, --width <PX>") && missing.ends_with("see 'halcyon rig --help'"),
+            "{missing}"
+        );
         let tip = line(&["features", "--lft", "a.png"]);
         assert!(tip.contains("unexpected argument '--lft'") && tip.contains("; tip: ") && tip.contains("'--left'"), "{tip}");
         let value = line(&["rig", "--width", "wide"]);

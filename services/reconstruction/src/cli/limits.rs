@@ -2,7 +2,7 @@
 
 /// A number that cannot be.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{name} must be {low} to {high}{unit}, not {value}{hint}")]
+#[error("{name} must be {low} to {high}{unit}, not {}{hint}", shown(*value, unit))]
 pub struct OutOfRange {
     /// The option, or what the number is.
     pub name: &'static str,
@@ -16,6 +16,11 @@ pub struct OutOfRange {
     pub unit: &'static str,
     /// What was probably meant; may be empty.
     pub hint: String,
+}
+
+/// A number with its unit; what is no number has none.
+fn shown(value: f64, unit: &str) -> String {
+    if value.is_finite() { format!("{value}{unit}") } else { value.to_string() }
 }
 
 impl OutOfRange {
@@ -44,9 +49,9 @@ mod tests {
     #[test]
     fn the_ends_are_within_and_nan_is_not() {
         assert!(within("--cell", 1.0, 1.0, 2.0, " m").is_ok() && within("--cell", 2.0, 1.0, 2.0, " m").is_ok());
-        for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 0.999, 2.001] {
-            let error = within("--cell", value, 1.0, 2.0, " m").unwrap_err();
-            assert_eq!(error.to_string(), format!("--cell must be 1 to 2 m, not {value}"));
+        let refused = |value| within("--cell", value, 1.0, 2.0, " m").unwrap_err().to_string();
+        for (value, text) in [(f64::NAN, "NaN"), (f64::INFINITY, "inf"), (f64::NEG_INFINITY, "-inf"), (0.999, "0.999 m")] {
+            assert_eq!(refused(value), format!("--cell must be 1 to 2 m, not {text}"));
         }
     }
 }

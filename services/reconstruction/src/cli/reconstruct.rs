@@ -128,7 +128,7 @@ pub fn reconstruct_pair(
         Err(ReconstructCliError::Cell { cell_m, source }) if !options.needs_grid() => {
             let done = chain.with_coarser_cells(&pair)?;
             warnings.push(format!(
-                "{source} with cells of {cell_m} m: figures of the patch are of cells of {} m instead (--cell)",
+                "no grid with cells of {cell_m} m, as {source}; figures of the patch are of cells of {} m instead (--cell)",
                 done.0.grid.cell_m
             ));
             done

@@ -20,6 +20,8 @@ const TILT_DEG_USUAL: f64 = 10.0;
 const OBLIQUE_DEG_MAX: f64 = 80.0;
 /// Points that scatter about their plane by more than this share of its distance are no water below a camera.
 const RMS_SHARE_USUAL: f64 = 0.1;
+/// A height that differs from what the pair shows by more than this share, and by more than its own uncertainty, is another's.
+const HEIGHT_SHARE_USUAL: f64 = 0.2;
 /// Below this disparity, pixels, a pixel's error is the whole distance.
 const DISPARITY_PX_MIN: f64 = 1.0;
 
@@ -75,6 +77,10 @@ pub(super) enum Doubt {
     Leaning { tilt_deg: f64 },
     #[error("the plane is {oblique_deg:.0}° off facing the left camera: unlikely for a rig over water")]
     EdgeOn { oblique_deg: f64 },
+    #[error(
+        "by the height that was given the left camera is {given_m:.2} m above the water, by the pictures {seen_m:.2} m: one of them, or the rig, is wrong"
+    )]
+    Height { given_m: f64, seen_m: f64 },
     #[error("the points scatter {rms_m:.2} m RMS about a plane {distance_m:.2} m away: unlikely for water")]
     Scatter { rms_m: f64, distance_m: f64 },
 }
@@ -112,7 +118,7 @@ pub(super) fn check_pose(pose: &PoseAtExposure, calibration: &RigCalibration) ->
     if off_nadir_deg > OFF_NADIR_DEG_MAX {
         return Err(ImpossibleError::Sky { off_nadir_deg });
     }
-    let height_m = -(pose.position_ned_m + pose.ned_from_body * calibration.camera_in_body_m).z;
+    let height_m = camera_height_m(pose, calibration);
     if height_m <= 0.0 {
         return Err(ImpossibleError::Submerged { depth_m: -height_m });
     }
@@ -126,6 +132,11 @@ pub(super) fn check_pose(pose: &PoseAtExposure, calibration: &RigCalibration) ->
         doubts.push(Doubt::Far { height_m, disparity_px, baseline_m });
     }
     Ok(doubts)
+}
+
+/// Height of the left camera above the mean water level, metres.
+fn camera_height_m(pose: &PoseAtExposure, calibration: &RigCalibration) -> f64 {
+    -(pose.position_ned_m + pose.ned_from_body * calibration.camera_in_body_m).z
 }
 
 /// Looks at the mean plane that was found; gives what is unlikely about it.
@@ -149,6 +160,11 @@ pub(super) fn check_plane(
         }
         if tilt_deg > TILT_DEG_USUAL + slack_deg {
             doubts.push(Doubt::Leaning { tilt_deg });
+        }
+        let given_m = camera_height_m(pose, calibration);
+        let off_m = (given_m - plane.distance_m).abs();
+        if off_m > HEIGHT_SHARE_USUAL * given_m && off_m > 5.0 * pose.height_sigma_m {
+            doubts.push(Doubt::Height { given_m, seen_m: plane.distance_m });
         }
     } else {
         let oblique_deg = angle_deg(plane.normal.z);
@@ -244,6 +260,11 @@ mod tests {
         );
         let vague = PoseAtExposure { attitude_sigma_rad: 0.1, ..level };
         assert_eq!(check(15.0, Some(&vague)), Ok(vec![]), "within three standard deviations of the attitude");
+        // 5 m are seen, from a camera 0.1 m below the body.
+        let high = PoseAtExposure { position_ned_m: Vector3::new(0.0, 0.0, -50.0), ..level };
+        assert!(check(0.0, Some(&high)).unwrap()[0].to_string().contains("is 49.90 m above the water, by the pictures 5.00 m"));
+        let unsure = PoseAtExposure { height_sigma_m: 10.0, ..high };
+        assert_eq!(check(0.0, Some(&unsure)), Ok(vec![]), "within five standard deviations of the height");
         let mut doubts = Doubts::default();
         for pair in ["a", "b"] {
             doubts.add(pair, check(15.0, Some(&level)).unwrap());
