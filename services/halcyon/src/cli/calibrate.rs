@@ -119,8 +119,9 @@ fn show(args: &Args, report: &CalibrateReport) -> anyhow::Result<ExitCode> {
     for (name, camera) in [("left", &report.left), ("right", &report.right)] {
         output::line(&format!("{name:<10} {}", camera_line(camera)))?;
     }
-    if let Some([columns_m, rows_m]) = report.board_warp_m {
-        output::line(&format!("board warp {:.3} mm along rows, {:.3} mm along columns", 1e3 * columns_m, 1e3 * rows_m))?;
+    if let (Some(warp), Some(high)) = (report.board_warp_m, report.board_warp_m_high) {
+        let [along_rows, along_columns] = [0, 1].map(|k| format!("{:.3} ± {:.3} mm", 1e3 * warp[k], 1e3 * (high[k] - warp[k])));
+        output::line(&format!("board warp {along_rows} along rows, {along_columns} along columns (95 %)"))?;
     }
     let depth = &report.depth_uncertainty;
     if let (Some(median_m), Some(max_m)) = (depth.median_m, depth.max_m) {
