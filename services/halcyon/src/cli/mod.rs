@@ -14,6 +14,7 @@ mod run;
 mod self_calibrate;
 mod sim;
 mod up;
+mod usage;
 
 use std::process::ExitCode;
 
@@ -64,7 +65,12 @@ enum Command {
 /// Runs the program.
 #[must_use]
 pub fn main() -> ExitCode {
-    let Cli { options, command } = Cli::parse();
+    let Cli { options, command } = match Cli::try_parse() {
+        Ok(cli) => cli,
+        // Help and version are no errors, and are printed as they are.
+        Err(error) if !error.use_stderr() => error.exit(),
+        Err(error) => return process::fail(&halcyon_chassis::ConfigError::new(usage::one_line(&error)).into()),
+    };
     let outcome = match command {
         Command::Up(args) => up::run(&options, &args),
         Command::Run(args) => run::run(&options, &args),

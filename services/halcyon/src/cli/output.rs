@@ -19,6 +19,23 @@ pub(super) fn line(text: &str) -> anyhow::Result<()> {
     }
 }
 
+/// Warnings go to stderr, beside JSON and beside text; JSON has them, too.
+pub(super) fn warnings(texts: &[String]) {
+    for text in texts {
+        eprintln!("warning: {text}");
+    }
+}
+
+/// So many significant digits, in whatever size the number is; no exponent.
+pub(super) fn significant(value: f64, digits: i32) -> String {
+    if !value.is_finite() || value == 0.0 {
+        return format!("{value}");
+    }
+    let leading = value.abs().log10().floor() as i32;
+    let decimals = (digits - 1 - leading).clamp(0, 12) as usize;
+    format!("{value:.decimals$}")
+}
+
 /// A progress bar on stderr; nothing where stderr is no terminal.
 pub(super) fn bar(what: &'static str) -> ProgressBar {
     let style = ProgressStyle::with_template("{msg} {bar:30} {pos}/{len} {eta}");
@@ -41,4 +58,24 @@ pub(super) fn spinner() -> ProgressBar {
 
 fn target() -> ProgressDrawTarget {
     if std::io::stderr().is_terminal() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::significant;
+
+    #[test]
+    fn digits_that_count_are_kept_at_any_size() {
+        for (value, text) in [
+            (0.000_123_456, "0.0001235"),
+            (1.234_56, "1.235"),
+            (123.456, "123.5"),
+            (12_345.6, "12346"),
+            (-0.05, "-0.05000"),
+            (0.0, "0"),
+            (f64::NAN, "NaN"),
+        ] {
+            assert_eq!(significant(value, 4), text);
+        }
+    }
 }

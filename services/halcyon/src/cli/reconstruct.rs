@@ -7,6 +7,7 @@ use halcyon_capture::SurveyFolder;
 use halcyon_chassis::clock::{Clock, ClockConfig};
 use halcyon_model::PoseAtExposure;
 use halcyon_reconstruction::cli::{self, MeshOf, PatchReport, PlaneReport, ReconstructOptions, SurveyFrame};
+use halcyon_reconstruction::core::calibrate::SIGMAS_95;
 
 use super::{bad_input, output};
 
@@ -68,7 +69,8 @@ struct Pose {
 
 #[derive(Debug, clap::Args)]
 struct How {
-    /// bm, sgbm, sgbm-3way, sgbm-hh, sgm or sgm8
+    /// guided (about the mean plane, sgm where there is none), sgm, sgm8, or OpenCV's bm, sgbm, sgbm-3way, sgbm-hh4 or sgbm-hh; for study
+    /// wta-COST or sgm-COST, where COST is sad, ssd, ncc, rank, census or mi
     #[arg(long, default_value = "guided")]
     engine: String,
     /// Cell of the elevation grid, metres; otherwise about ten pixels
@@ -150,6 +152,7 @@ fn pair(left: &Path, right: &Path, rig: &Path, args: &Args, options: &Reconstruc
     let report = cli::reconstruct_pair(left, right, rig, pose, options);
     spinner.finish_and_clear();
     let report = report.map_err(bad_input)?;
+    output::warnings(&report.warnings);
     if args.json {
         output::json(&report)?;
         return Ok(ExitCode::SUCCESS);
@@ -185,6 +188,7 @@ fn survey(folder: &Path, args: &Args, options: &ReconstructOptions) -> anyhow::R
     let report = cli::reconstruct_survey(survey.rig(), &frames, options, &mut progress);
     bar.finish_and_clear();
     let report = report.map_err(bad_input)?;
+    output::warnings(&report.warnings);
     if args.json {
         output::json(&report)?;
         return Ok(ExitCode::SUCCESS);
@@ -220,16 +224,16 @@ fn surface(plane: &PlaneReport, patch: &PatchReport) -> anyhow::Result<()> {
         plane.rms_m * 1e3
     ))?;
     output::line(&format!(
-        "patch      {} x {} cells of {} m, {:.1} % measured, sigma {:.2} mm, elevation RMS {:.2} mm",
+        "patch      {} x {} cells of {} m, {:.1} % measured, each to ± {:.2} mm (95 %), elevation RMS {:.2} mm",
         patch.rows,
         patch.cols,
         patch.cell_m,
         patch.coverage * 100.0,
-        patch.sigma_m * 1e3,
+        SIGMAS_95 * patch.sigma_m * 1e3,
         patch.elevation_rms_m * 1e3
     ))?;
     if let (Some(level_m), Some(low_m), Some(high_m)) = (patch.level_m, patch.level_m_low, patch.level_m_high) {
-        output::line(&format!("level      {level_m:.3} m above the datum ({low_m:.3} to {high_m:.3})"))?;
+        output::line(&format!("level      {level_m:.3} m above the datum (95 %: {low_m:.3} to {high_m:.3} m)"))?;
     }
     Ok(())
 }

@@ -5,10 +5,13 @@ use std::path::PathBuf;
 use halcyon_model::{PoseAtExposure, RigCalibration, Stamp, SurfacePatch};
 use serde::Serialize;
 
-use super::{Chain, PatchReport, PlaneReport, ReconstructCliError, ReconstructOptions, read_picture, stereo_pair};
+use super::{
+    Chain, Doubt, Doubts, PatchReport, PlaneReport, ReconstructCliError, ReconstructOptions, check_pose, read_stereo_pair,
+};
 use crate::cli::speed::Spent;
 use crate::core::cloud::CloudFrame;
 use crate::core::reconstruct::Settings;
+use crate::files::check_rig;
 use crate::files::netcdf::Series;
 
 /// One pair of a survey.
@@ -60,6 +63,8 @@ pub struct SurveyReport {
     pub cpu_ms: Option<f64>,
     /// Time of the chain, all pairs, milliseconds.
     pub wall_ms: f64,
+    /// What makes the result doubtful, one line a sort; mostly empty.
+    pub warnings: Vec<String>,
 }
 
 /// Reconstructs the pairs of a survey in order. Pairs that make no patch are passed over and listed; `progress` hears
@@ -73,12 +78,14 @@ pub fn reconstruct_survey(
     options: &ReconstructOptions,
     progress: &mut dyn FnMut(usize, usize, Option<&FailedPair>),
 ) -> Result<SurveyReport, ReconstructCliError> {
-    options.check_outputs()?;
     for (path, flag) in [(&options.cloud, "--cloud"), (&options.mesh, "--mesh"), (&options.disparity, "--disparity")] {
         if path.is_some() {
             return Err(ReconstructCliError::OnePair(flag));
         }
     }
+    let pictures = frames.iter().flat_map(|frame| [frame.left.as_path(), frame.right.as_path()]);
+    options.check_outputs(pictures.map(|path| ("DIR", path)))?;
+    check_rig(calibration)?;
     // "Without attitude the rig is taken as fixed."
     let fixed_rig = frames.iter().all(|frame| frame.pose.is_none());
     let frame = if fixed_rig { CloudFrame::Plane } else { CloudFrame::Gravity };
@@ -88,12 +95,14 @@ pub fn reconstruct_survey(
         None => None,
     };
     let mut chain = Chain::new(settings, options.cell_m.is_none());
-    let (mut sums, mut failed, mut first_error) = (Sums::default(), Vec::new(), None);
+    let (mut sums, mut doubts) = (Sums::default(), Doubts::default());
+    let (mut failed, mut first_error) = (Vec::new(), None);
     progress(0, frames.len(), None);
     for (index, frame) in frames.iter().enumerate() {
         let outcome = one(&mut chain, calibration, frame, index as u64);
         let failure = match outcome {
-            Ok((patch, timing)) => {
+            Ok((patch, timing, of_pair)) => {
+                doubts.add(&frame.name, of_pair);
                 if let Some(series) = &mut series {
                     series.push(&patch)?;
                 }
@@ -114,7 +123,7 @@ pub fn reconstruct_survey(
             if let Some(series) = &mut series {
                 options.write_series(series, calibration)?;
             }
-            Ok(report)
+            Ok(SurveyReport { warnings: doubts.lines(), ..report })
         }
         (None, Some((name, error))) => Err(ReconstructCliError::NoPatch { pairs: frames.len(), name, source: Box::new(error) }),
         (None, None) => Err(crate::files::netcdf::SeriesError::Empty.into()),
@@ -126,10 +135,12 @@ fn one(
     calibration: &RigCalibration,
     frame: &SurveyFrame,
     sequence: u64,
-) -> Result<(SurfacePatch, Spent), ReconstructCliError> {
-    let (left, right) = (read_picture(&frame.left)?, read_picture(&frame.right)?);
-    let pair = stereo_pair(*calibration, left, right, frame.pose, frame.stamp, sequence)?;
-    Ok(chain.timed(&pair)?)
+) -> Result<(SurfacePatch, Spent, Vec<Doubt>), ReconstructCliError> {
+    let mut doubts = frame.pose.as_ref().map_or(Ok(Vec::new()), |pose| check_pose(pose, calibration))?;
+    let pair = read_stereo_pair(*calibration, [&frame.left, &frame.right], frame.pose, frame.stamp, sequence)?;
+    let (patch, took) = chain.timed(&pair)?;
+    doubts.extend(chain.check(&pair, &patch)?);
+    Ok((patch, took, doubts))
 }
 
 /// An error and its causes on one line.
@@ -202,6 +213,7 @@ impl Sums {
             patch,
             cpu_ms: self.cpu_ms,
             wall_ms: self.wall_ms,
+            warnings: Vec::new(),
         })
     }
 }
