@@ -13,6 +13,7 @@
 //! **Invariant:** nothing under `core` knows the time, the bus or the disk, and nothing here knows a vehicle.
 
 pub mod core;
+pub mod table;
 
 mod actor;
 mod config;
