@@ -11,6 +11,7 @@
 //! | [`height`] | Rayleigh heights, the expected highest wave |
 //! | [`confidence`] | confidence limits of variances |
 //! | [`outlier`] | readings that cannot be, replaced by their neighbour |
+//! | [`quality`] | the QARTOD tests of a record, its repair, rotor ripples |
 //! | [`filter`], [`spline`] | splitting a record by frequency; uneven samples to even ones |
 //!
 //! Elevation is positive up, metres; densities are one-sided, m²/Hz.
@@ -24,6 +25,7 @@ pub mod dispersion;
 pub mod filter;
 pub mod height;
 pub mod outlier;
+pub mod quality;
 pub mod record;
 mod special;
 pub mod spectrum;
