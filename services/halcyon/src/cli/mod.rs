@@ -15,6 +15,7 @@ mod self_calibrate;
 mod sim;
 mod up;
 mod usage;
+mod waves;
 
 use std::process::ExitCode;
 
@@ -50,6 +51,8 @@ enum Command {
     Reconstruct(reconstruct::Args),
     /// Say what a rig can measure, from which altitude: footprint, noise, smallest waves, best altitude
     Rig(rig::Args),
+    /// Say everything about the waves in a file of elevations
+    Waves(waves::Args),
     /// Judge accuracy against water that is known exactly, beside the thesis's figures
     Bench(bench::Args),
     /// Make the thesis's tables and figures again, its values beside ours
@@ -80,6 +83,7 @@ pub fn main() -> ExitCode {
         Command::Match(args) => matching::run(&args),
         Command::Reconstruct(args) => reconstruct::run(&args),
         Command::Rig(args) => rig::run(&args),
+        Command::Waves(args) => waves::run(&args),
         Command::Bench(args) => bench::run(&args),
         Command::Lab(args) => lab::run(&args),
         Command::Mission(args) => mission::run(args),
