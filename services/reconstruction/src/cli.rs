@@ -24,7 +24,7 @@ pub use matching::{MatchCliError, MatchReport, TruthReport, match_pair};
 pub use options::{MatchOptions, OptionError};
 pub use reconstruct::{
     FailedPair, ImpossibleError, MeshOf, PatchReport, PlaneReport, ReconstructCliError, ReconstructOptions, ReconstructReport,
-    SurveyFrame, SurveyReport, cloud_of, given_pose, reconstruct_pair, reconstruct_survey,
+    SurveyFrame, SurveyReport, SurveyStep, cloud_of, given_pose, reconstruct_pair, reconstruct_survey,
 };
 pub use rig::{BestRow, BudgetRow, RigCliError, RigNumbers, RigOptions, RigReport, RigSource, rig};
 pub use self_calibrate::{

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use halcyon_model::{Image, PoseAtExposure, StereoPair, rig_yaml};
 use halcyon_reconstruction::cli::{
-    FailedPair, MeshOf, ReconstructCliError, ReconstructOptions, SurveyFrame, given_pose, reconstruct_pair, reconstruct_survey,
+    MeshOf, ReconstructCliError, ReconstructOptions, SurveyFrame, SurveyStep, given_pose, reconstruct_pair, reconstruct_survey,
 };
 use halcyon_reconstruction::files::{FileError, OutputError, RigFileError};
 use support::scene::{default_rig, pose, render};
@@ -145,7 +145,8 @@ fn a_survey_names_its_bad_pairs_and_goes_on() {
     write_pgm(&frames[2].right, &Image::new(320, 240, vec![0; 320 * 240].into()).unwrap());
     let options = ReconstructOptions { grid: Some(scene.path("g.nc")), ..options() };
     let mut heard = Vec::new();
-    let mut progress = |done: usize, total: usize, failed: Option<&FailedPair>| heard.push((done, total, failed.is_some()));
+    let mut progress =
+        |step: SurveyStep<'_>| heard.push((step.done, step.total, step.outcome.is_some_and(|outcome| outcome.is_err())));
     let report = reconstruct_survey(&default_rig(), &frames, &options, &mut progress).unwrap();
     assert_eq!((report.pairs, report.patches, report.frame), (4, 2, "gravity"));
     let names: Vec<_> = report.failed.iter().map(|failed| failed.name.as_str()).collect();
@@ -162,10 +163,10 @@ fn a_survey_names_its_bad_pairs_and_goes_on() {
     assert_eq!(file.dimension_len("time"), Some(2));
     drop(file);
 
-    let none = reconstruct_survey(&default_rig(), &frames[1..3], &options, &mut |_, _, _| {}).unwrap_err();
+    let none = reconstruct_survey(&default_rig(), &frames[1..3], &options, &mut |_| {}).unwrap_err();
     assert!(none.to_string().starts_with("none of 2 pairs became a patch; the first, 1"), "{none}");
     let cloud = ReconstructOptions { cloud: Some(scene.path("c.ply")), ..options.clone() };
-    let refused = reconstruct_survey(&default_rig(), &frames, &cloud, &mut |_, _, _| {});
+    let refused = reconstruct_survey(&default_rig(), &frames, &cloud, &mut |_| {});
     assert!(matches!(refused, Err(ReconstructCliError::OnePair("--cloud"))));
 }
 

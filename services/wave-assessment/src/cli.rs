@@ -1,14 +1,15 @@
 //! What `halcyon waves` does: a file of readings in, every statistic of its waves out. No arguments are parsed and nothing is printed here.
 
 mod report;
+mod survey;
 
 use std::path::{Path, PathBuf};
 
 use halcyon_ocean::quality::readings::ReadingLimits;
-use halcyon_ocean::quality::{Assessment, Finding, Flag, Limits, RawSeries, assess};
-use halcyon_ocean::record::RecordError;
+use halcyon_ocean::quality::{Finding, Flag, Limits, RawSeries, assess};
 
 pub use report::{Band, Burst, FlagReport, Spectrum, WavesReport, ZeroCrossing};
+pub use survey::{SeaReport, Survey, SurveyError, VerdictReport};
 
 use crate::table::{Choice, ChoiceError, Table, TableError};
 
@@ -101,13 +102,9 @@ pub fn waves(options: &WavesOptions) -> Result<WavesReport, WavesError> {
     let readings = table.readings(&options.choice).map_err(|source| WavesError::Choice { path: path.clone(), source })?;
     drop(table);
     let raw = RawSeries { stamp_s: &readings.stamp_s, elevation_m: &readings.elevation_m };
-    // What is rejected is filled in, and a crest that was real would be lost: an hour at 10 Hz of a Gaussian sea reaches 4.2 deviations on
-    // average, and 6 once in 14,000 such hours.
-    let readings_limits = ReadingLimits { spike_sigmas: 6.0, ..ReadingLimits::default() };
-    let limits = Limits { segment_s: options.segment_s, readings: readings_limits, ..Limits::default() };
     let bursts = match options.burst_s {
-        None => vec![burst(raw, &limits, options)?],
-        Some(burst_s) => bursts(raw, burst_s, &limits, options)?,
+        None => vec![burst(raw, options)?],
+        Some(burst_s) => bursts(raw, burst_s, options)?,
     };
     Ok(WavesReport::new(&readings, bursts))
 }
@@ -139,7 +136,7 @@ fn read(path: &Path) -> Result<Vec<u8>, WavesError> {
 }
 
 /// Cuts a series by its stamps, from the first one on. What is left over at the end makes no burst.
-fn bursts(raw: RawSeries<'_>, burst_s: f64, limits: &Limits, options: &WavesOptions) -> Result<Vec<Burst>, WavesError> {
+fn bursts(raw: RawSeries<'_>, burst_s: f64, options: &WavesOptions) -> Result<Vec<Burst>, WavesError> {
     /// A day of bursts of ten seconds.
     const BURSTS_MAX: usize = 8640;
     let finite = || raw.stamp_s.iter().copied().filter(|stamp| stamp.is_finite());
@@ -163,17 +160,23 @@ fn bursts(raw: RawSeries<'_>, burst_s: f64, limits: &Limits, options: &WavesOpti
             elevations.push(*elevation_m);
         }
     }
-    let each = cut.iter().map(|(stamp_s, elevation_m)| burst(RawSeries { stamp_s, elevation_m }, limits, options));
+    let each = cut.iter().map(|(stamp_s, elevation_m)| burst(RawSeries { stamp_s, elevation_m }, options));
     each.collect()
 }
 
-fn burst(raw: RawSeries<'_>, limits: &Limits, options: &WavesOptions) -> Result<Burst, WavesError> {
-    let assessment: Assessment = assess(raw, limits);
-    let Some(even) = &assessment.even else {
-        return Err(WavesError::NoRecord { path: options.input.clone(), reason: why_none(&assessment.findings) });
-    };
-    let record_error = |error: RecordError| WavesError::NoRecord { path: options.input.clone(), reason: error.to_string() };
-    Burst::new(even, &assessment, options).map_err(record_error)
+fn burst(raw: RawSeries<'_>, options: &WavesOptions) -> Result<Burst, WavesError> {
+    analyse(raw, options.segment_s, options.band_hz)
+        .map_err(|reason| WavesError::NoRecord { path: options.input.clone(), reason })
+}
+
+/// One record's quality and statistics; in words why there are none.
+fn analyse(raw: RawSeries<'_>, segment_s: f64, band_hz: (f64, f64)) -> Result<Burst, String> {
+    // What is rejected is filled in, and a crest that was real would be lost: an hour at 10 Hz of a Gaussian sea reaches 4.2 deviations on
+    // average, and 6 once in 14,000 such hours.
+    let readings = ReadingLimits { spike_sigmas: 6.0, ..ReadingLimits::default() };
+    let assessment = assess(raw, &Limits { segment_s, readings, ..Limits::default() });
+    let Some(even) = &assessment.even else { return Err(why_none(&assessment.findings)) };
+    Burst::new(even, &assessment, segment_s, band_hz).map_err(|error| error.to_string())
 }
 
 /// What is wrong with readings that make no record, in words.

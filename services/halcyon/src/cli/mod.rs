@@ -13,6 +13,7 @@ mod rig;
 mod run;
 mod self_calibrate;
 mod sim;
+mod survey;
 mod up;
 mod usage;
 mod waves;
@@ -51,6 +52,8 @@ enum Command {
     Reconstruct(reconstruct::Args),
     /// Say what a rig can measure, from which altitude: footprint, noise, smallest waves, best altitude
     Rig(rig::Args),
+    /// Judge the sea state of a survey folder: heights with intervals, verdict, maps, report
+    Survey(survey::Args),
     /// Say everything about the waves in a file of elevations
     Waves(waves::Args),
     /// Judge accuracy against water that is known exactly, beside the thesis's figures
@@ -84,6 +87,7 @@ pub fn main() -> ExitCode {
         Command::Reconstruct(args) => reconstruct::run(&args),
         Command::Rig(args) => rig::run(&args),
         Command::Waves(args) => waves::run(&args),
+        Command::Survey(args) => survey::run(&options, &args),
         Command::Bench(args) => bench::run(&args),
         Command::Lab(args) => lab::run(&args),
         Command::Mission(args) => mission::run(args),

@@ -106,7 +106,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
 }
 
 /// Four digits: no wave is known better.
-fn four(value: f64) -> String {
+pub(super) fn four(value: f64) -> String {
     significant(value, 4)
 }
 
@@ -163,7 +163,7 @@ fn print_burst(burst: &Burst) -> anyhow::Result<()> {
 }
 
 /// Every number with its name and unit.
-fn rows(burst: &Burst) -> Vec<(String, String)> {
+pub(super) fn rows(burst: &Burst) -> Vec<(String, String)> {
     let mut rows = Vec::new();
     let mut add = |name: &str, text: String| rows.push((name.to_owned(), text));
     for (kind, of) in [("up", &burst.zero_up), ("down", &burst.zero_down)] {
@@ -190,7 +190,7 @@ fn rows(burst: &Burst) -> Vec<(String, String)> {
     rows
 }
 
-fn spectrum(burst: &Burst) -> Result<Chart, ChartError> {
+pub(super) fn spectrum(burst: &Burst) -> Result<Chart, ChartError> {
     let Some(density) = &burst.density else { return Err(ChartError::Empty) };
     let band = burst.spectrum.map_or((0.0, f64::INFINITY), |s| (s.band.low_hz, s.band.high_hz));
     let points = density.density_m2_per_hz().iter().enumerate().map(|(i, d)| (i as f64 * density.df_hz(), *d));
@@ -205,31 +205,37 @@ fn page(report: &WavesReport, options: &WavesOptions) -> Result<Page, ChartError
         if bursts.len() > 1 {
             page.heading(&format!("Burst {}", i + 1));
         }
-        page.paragraph(&format!(
-            "{} samples at {} Hz, {:.1} s, {} of them filled in.",
-            burst.samples,
-            four(burst.rate_hz),
-            burst.duration_s,
-            burst.filled
-        ));
-        let step_s = 1.0 / burst.rate_hz;
-        let series = burst.elevation_m.iter().enumerate().map(|(i, z)| (i as f64 * step_s, *z)).collect();
-        let elevation = Chart::new("time, s", "elevation, m").with(Series::line("", series));
-        page.figure(&elevation.svg()?, "Elevation about its trend");
-        if let Ok(svg) = spectrum(burst).and_then(|chart| chart.svg()) {
-            page.figure(&svg, "Variance density spectrum");
-        }
-        let numbers: Vec<[String; 2]> = rows(burst).into_iter().map(|(name, value)| [name, value]).collect();
-        page.table(&["quantity", "value"], &numbers);
-        let flags: Vec<[String; 4]> = burst
-            .quality
-            .iter()
-            .map(|f| {
-                let number = f.qartod.map_or_else(String::new, |number| number.to_string());
-                [f.test.to_owned(), number, f.flag.to_string(), f.reason.clone()]
-            })
-            .collect();
-        page.table(&["quality test", "QARTOD", "flag", "reason"], &flags);
+        draw(&mut page, burst)?;
     }
     Ok(page)
+}
+
+/// Everything about one record.
+pub(super) fn draw(page: &mut Page, burst: &Burst) -> Result<(), ChartError> {
+    page.paragraph(&format!(
+        "{} samples at {} Hz, {:.1} s, {} of them filled in.",
+        burst.samples,
+        four(burst.rate_hz),
+        burst.duration_s,
+        burst.filled
+    ));
+    let step_s = 1.0 / burst.rate_hz;
+    let series = burst.elevation_m.iter().enumerate().map(|(i, z)| (i as f64 * step_s, *z)).collect();
+    let elevation = Chart::new("time, s", "elevation, m").with(Series::line("", series));
+    page.figure(&elevation.svg()?, "Elevation about its trend");
+    if let Ok(svg) = spectrum(burst).and_then(|chart| chart.svg()) {
+        page.figure(&svg, "Variance density spectrum");
+    }
+    let numbers: Vec<[String; 2]> = rows(burst).into_iter().map(|(name, value)| [name, value]).collect();
+    page.table(&["quantity", "value"], &numbers);
+    let flags: Vec<[String; 4]> = burst
+        .quality
+        .iter()
+        .map(|f| {
+            let number = f.qartod.map_or_else(String::new, |number| number.to_string());
+            [f.test.to_owned(), number, f.flag.to_string(), f.reason.clone()]
+        })
+        .collect();
+    page.table(&["quality test", "QARTOD", "flag", "reason"], &flags);
+    Ok(())
 }

@@ -12,7 +12,7 @@ pub use options::{MeshOf, ReconstructOptions, given_pose};
 pub use plausible::ImpossibleError;
 use plausible::{Doubt, Doubts, check_plane, check_pose};
 pub use report::{PatchReport, PlaneReport, ReconstructReport};
-pub use survey::{FailedPair, SurveyFrame, SurveyReport, reconstruct_survey};
+pub use survey::{FailedPair, SurveyFrame, SurveyReport, SurveyStep, reconstruct_survey};
 
 use super::speed::{Spent, spent};
 use super::texture::without_texture;

@@ -6,7 +6,6 @@ use halcyon_ocean::record::RecordError;
 use halcyon_ocean::{SampledSpectrum, Welch};
 use serde::Serialize;
 
-use super::WavesOptions;
 use crate::table::Readings;
 
 /// A file's waves.
@@ -160,12 +159,12 @@ impl From<&Finding> for FlagReport {
 }
 
 impl Burst {
-    pub(super) fn new(even: &Even, assessment: &Assessment, options: &WavesOptions) -> Result<Self, RecordError> {
+    pub(super) fn new(even: &Even, assessment: &Assessment, segment_s: f64, band_hz: (f64, f64)) -> Result<Self, RecordError> {
         let mean_m = even.record.mean_m();
         let record = even.record.clone().without_trend();
         let of = |crossing| WaveStatistics::of(&waves(&record, crossing, 0.0)).map(ZeroCrossing::from);
-        let density = Welch::with_segments_of_s(options.segment_s, &record).spectrum(&record)?;
-        let (low_hz, high_hz) = (options.band_hz.0, options.band_hz.1.min(0.5 * record.rate_hz()));
+        let density = Welch::with_segments_of_s(segment_s, &record).spectrum(&record)?;
+        let (low_hz, high_hz) = (band_hz.0, band_hz.1.min(0.5 * record.rate_hz()));
         let spectrum = density.statistics(low_hz, high_hz).map(|found| {
             let moment = |order| density.moment(order, low_hz, high_hz);
             Spectrum {

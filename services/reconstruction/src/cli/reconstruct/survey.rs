@@ -38,6 +38,17 @@ pub struct FailedPair {
     pub why: String,
 }
 
+/// How far a survey is, and what the last pair gave.
+#[derive(Debug, Clone, Copy)]
+pub struct SurveyStep<'a> {
+    /// Pairs done.
+    pub done: usize,
+    /// Of so many.
+    pub total: usize,
+    /// The last one's patch, or why there is none; `None` before the first.
+    pub outcome: Option<Result<&'a SurfacePatch, &'a FailedPair>>,
+}
+
 /// All pairs, as `--json` prints it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SurveyReport {
@@ -67,8 +78,7 @@ pub struct SurveyReport {
     pub warnings: Vec<String>,
 }
 
-/// Reconstructs the pairs of a survey in order. Pairs that make no patch are passed over and listed; `progress` hears
-/// how many of how many are done, and of each failure as it happens.
+/// Reconstructs the pairs of a survey in order. Pairs that make no patch are passed over and listed; `heard` hears of every step.
 ///
 /// # Errors
 /// [`ReconstructCliError`]: bad options, an output that cannot be written, or not one patch.
@@ -76,7 +86,7 @@ pub fn reconstruct_survey(
     calibration: &RigCalibration,
     frames: &[SurveyFrame],
     options: &ReconstructOptions,
-    progress: &mut dyn FnMut(usize, usize, Option<&FailedPair>),
+    heard: &mut dyn FnMut(SurveyStep<'_>),
 ) -> Result<SurveyReport, ReconstructCliError> {
     for (path, flag) in [(&options.cloud, "--cloud"), (&options.mesh, "--mesh"), (&options.disparity, "--disparity")] {
         if path.is_some() {
@@ -97,26 +107,26 @@ pub fn reconstruct_survey(
     let mut chain = Chain::new(settings, options.cell_m.is_none());
     let (mut sums, mut doubts) = (Sums::default(), Doubts::default());
     let (mut failed, mut first_error) = (Vec::new(), None);
-    progress(0, frames.len(), None);
+    let total = frames.len();
+    heard(SurveyStep { done: 0, total, outcome: None });
     for (index, frame) in frames.iter().enumerate() {
-        let outcome = one(&mut chain, calibration, frame, index as u64);
-        let failure = match outcome {
+        let done = index + 1;
+        match one(&mut chain, calibration, frame, index as u64) {
             Ok((patch, timing, of_pair)) => {
                 doubts.add(&frame.name, of_pair);
                 if let Some(series) = &mut series {
                     series.push(&patch)?;
                 }
                 sums.add(&patch, timing);
-                None
+                heard(SurveyStep { done, total, outcome: Some(Ok(&patch)) });
             }
             Err(error) => {
                 let failure = FailedPair { name: frame.name.clone(), why: one_line(&error) };
                 first_error.get_or_insert((frame.name.clone(), error));
-                Some(failure)
+                heard(SurveyStep { done, total, outcome: Some(Err(&failure)) });
+                failed.push(failure);
             }
-        };
-        progress(index + 1, frames.len(), failure.as_ref());
-        failed.extend(failure);
+        }
     }
     match (sums.report(chain.engine, frame.name(), frames.len(), failed), first_error) {
         (Some(report), _) => {
