@@ -9,6 +9,7 @@
 //! | [`crossing`] | zero-crossing analysis: waves, H_m, H_s, H_1/10, H_max, T_z, T_1/3 |
 //! | [`welch`] | Welch's spectrum, H_m0, T_p, T_m01, T_m02, T_e |
 //! | [`height`] | Rayleigh heights, the expected highest wave |
+//! | [`interval`] | 95 % intervals of wave statistics: bootstrap by groups, spectra |
 //! | [`confidence`] | confidence limits of variances |
 //! | [`outlier`] | readings that cannot be, replaced by their neighbour |
 //! | [`quality`] | the QARTOD tests of a record, its repair, rotor ripples |
@@ -24,6 +25,7 @@ pub mod crossing;
 pub mod dispersion;
 pub mod filter;
 pub mod height;
+pub mod interval;
 pub mod outlier;
 pub mod quality;
 pub mod record;

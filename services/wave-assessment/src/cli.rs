@@ -2,6 +2,7 @@
 
 mod report;
 mod survey;
+mod verdict;
 
 use std::path::{Path, PathBuf};
 
@@ -9,7 +10,8 @@ use halcyon_ocean::quality::readings::ReadingLimits;
 use halcyon_ocean::quality::{Finding, Flag, Limits, RawSeries, assess};
 
 pub use report::{Band, Burst, FlagReport, Spectrum, WavesReport, ZeroCrossing};
-pub use survey::{SeaReport, Survey, SurveyError, VerdictReport};
+pub use survey::{Heights, SeaReport, Survey, SurveyError};
+pub use verdict::{ReasonReport, VerdictReport, verdict};
 
 use crate::table::{Choice, ChoiceError, Table, TableError};
 

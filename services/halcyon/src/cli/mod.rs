@@ -86,7 +86,7 @@ pub fn main() -> ExitCode {
         Command::Match(args) => matching::run(&args),
         Command::Reconstruct(args) => reconstruct::run(&args),
         Command::Rig(args) => rig::run(&args),
-        Command::Waves(args) => waves::run(&args),
+        Command::Waves(args) => waves::run(&options, &args),
         Command::Survey(args) => survey::run(&options, &args),
         Command::Bench(args) => bench::run(&args),
         Command::Lab(args) => lab::run(&args),

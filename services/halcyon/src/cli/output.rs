@@ -26,12 +26,15 @@ pub(super) fn warnings(texts: &[String]) {
     }
 }
 
-/// So many significant digits, in whatever size the number is; no exponent.
+/// So many significant digits, in whatever size the number is; no exponent. What is less than a billionth is 0.
 pub(super) fn significant(value: f64, digits: i32) -> String {
     if !value.is_finite() || value == 0.0 {
         return format!("{value}");
     }
     let leading = value.abs().log10().floor() as i32;
+    if leading < -9 {
+        return "0".to_owned();
+    }
     let decimals = (digits - 1 - leading).clamp(0, 12) as usize;
     format!("{value:.decimals$}")
 }

@@ -156,12 +156,12 @@ fn print(judged: &Judged) -> anyhow::Result<()> {
         sea_state.waves
     ))?;
     for [name, text] in heights(sea_state) {
-        output::line(&format!("{name:<28} {text}"))?;
+        output::line(&format!("{name:<32} {text}"))?;
     }
     if let Some(centre) = &sea_state.centre {
         output::line("at the middle of the patches:")?;
         for (name, text) in rows(centre) {
-            output::line(&format!("{name:<28} {text}"))?;
+            output::line(&format!("{name:<32} {text}"))?;
         }
     }
     Ok(())

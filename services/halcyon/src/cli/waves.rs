@@ -3,10 +3,13 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use halcyon_chassis::ConfigError;
+use halcyon_chassis::{ConfigError, Options};
 use halcyon_reconstruction::files::{Output, check_outputs, has_ending, write_bytes};
-use halcyon_wave_assessment::cli::{self, Burst, WavesOptions, WavesReport, ZeroCrossing};
+use halcyon_wave_assessment::Config;
+use halcyon_wave_assessment::cli::{self, Burst, VerdictReport, WavesOptions, WavesReport, ZeroCrossing};
 use halcyon_wave_assessment::table::{Choice, LengthUnit, TimeUnit};
+
+use serde::Serialize;
 
 use super::output::significant;
 use super::{bad_input, output};
@@ -71,7 +74,7 @@ fn time_unit(text: &str) -> Result<TimeUnit, String> {
     TimeUnit::ALL.iter().copied().find(|unit| unit.as_str() == text).ok_or_else(|| "use s, ms, us, ns, min, h or d".into())
 }
 
-pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+pub(super) fn run(options: &Options, args: &Args) -> anyhow::Result<ExitCode> {
     let Some(input) = args.file.as_ref().or(args.input.as_ref()) else {
         return Err(ConfigError::new("name the file of readings").into());
     };
@@ -79,6 +82,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         check_outputs([("FILE", input.as_path())], &[Output::file("--plot", plot, &["svg", "html", "htm"])])
             .map_err(bad_input)?;
     }
+    let config: Config = options.settings()?.section()?;
     let options = WavesOptions {
         input: input.clone(),
         choice: Choice {
@@ -97,11 +101,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         let drawn = if has_ending(path, &["svg"]) { spectrum(&report.first)?.svg()? } else { page(&report, &options)?.html() };
         write_bytes(path, drawn.as_bytes()).map_err(bad_input)?;
     }
+    let verdict = cli::verdict(&report.first, &config);
     if args.json {
-        output::json(&report)?;
+        output::json(&Judged { report: &report, verdict: &verdict })?;
         return Ok(ExitCode::SUCCESS);
     }
-    print(&report)?;
+    print(&report, &verdict)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -110,11 +115,25 @@ pub(super) fn four(value: f64) -> String {
     significant(value, 4)
 }
 
-fn print(report: &WavesReport) -> anyhow::Result<()> {
+/// As `--json` prints it.
+#[derive(Debug, Serialize)]
+struct Judged<'a> {
+    #[serde(flatten)]
+    report: &'a WavesReport,
+    /// On the whole record, or the first burst of several.
+    verdict: &'a VerdictReport,
+}
+
+fn print(report: &WavesReport, verdict: &VerdictReport) -> anyhow::Result<()> {
     let stamps = report.time_column.as_ref().map_or_else(|| "stated rate".to_owned(), |name| format!("{name:?}"));
     output::line(&format!("elevation {:?} ({}), stamps: {stamps}", report.value_column, report.unit))?;
     if report.bursts.is_empty() {
-        return print_burst(&report.first);
+        print_burst(&report.first)?;
+        output::line(&format!("verdict: {}", verdict.state))?;
+        for reason in &verdict.reasons {
+            output::line(&format!("  {} {}", if reason.passed { "+" } else { "-" }, reason.text))?;
+        }
+        return Ok(());
     }
     output::line("burst  H_m0 m   T_p s    f_p Hz   H_s m    H_m m    T_z s    T_1/3 s  waves  quality")?;
     for (i, burst) in report.bursts.iter().enumerate() {
@@ -154,12 +173,20 @@ fn print_burst(burst: &Burst) -> anyhow::Result<()> {
         four(burst.deviation_m)
     ))?;
     for (name, row) in rows(burst) {
-        output::line(&format!("{name:<28} {row}"))?;
+        output::line(&format!("{name:<32} {row}"))?;
     }
     for flag in burst.quality.iter().filter(|flag| flag.flag >= 3) {
         output::line(&format!("{} {}: {}", flag.test, if flag.flag == 3 { "suspect" } else { "failed" }, flag.reason))?;
     }
     Ok(())
+}
+
+/// A number with its interval, where it has one.
+fn with_bounds(value: f64, low: Option<f64>, high: Option<f64>, unit: &str) -> String {
+    match (low, high) {
+        (Some(low), Some(high)) => format!("{} {unit} (95 %: {} to {} {unit})", four(value), four(low), four(high)),
+        _ => format!("{} {unit}", four(value)),
+    }
 }
 
 /// Every number with its name and unit.
@@ -172,18 +199,25 @@ pub(super) fn rows(burst: &Burst) -> Vec<(String, String)> {
             continue;
         };
         add(&format!("waves (zero-{kind})"), z.waves.to_string());
-        add("  H_m, H_rms", format!("{}, {} m", four(z.h_mean_m), four(z.h_rms_m)));
-        add("  H_s, H_1/10, H_max", format!("{}, {}, {} m", four(z.h_s_m), four(z.h_tenth_m), four(z.h_max_m)));
-        add("  T_z, T_1/3", format!("{}, {} s", four(z.t_z_s), four(z.t_third_s)));
-        add("  crest, trough", format!("{}, {} m", four(z.crest_max_m), four(z.trough_min_m)));
+        add("  H_m", with_bounds(z.h_mean_m, z.h_mean_m_low, z.h_mean_m_high, "m"));
+        add("  H_rms", with_bounds(z.h_rms_m, z.h_rms_m_low, z.h_rms_m_high, "m"));
+        add("  H_s (H_1/3)", with_bounds(z.h_s_m, z.h_s_m_low, z.h_s_m_high, "m"));
+        add("  H_1/10", with_bounds(z.h_tenth_m, z.h_tenth_m_low, z.h_tenth_m_high, "m"));
+        add("  H_max", format!("{} m", four(z.h_max_m)));
+        add("  T_z", with_bounds(z.t_z_s, z.t_z_s_low, z.t_z_s_high, "s"));
+        add("  T_1/3", with_bounds(z.t_third_s, z.t_third_s_low, z.t_third_s_high, "s"));
+        add("  highest crest, lowest trough", format!("{}, {} m", four(z.crest_max_m), four(z.trough_min_m)));
     }
     match &burst.spectrum {
         None => add("spectrum", "no energy".into()),
         Some(s) => {
             add("spectrum", format!("{} to {} Hz", four(s.band.low_hz), four(s.band.high_hz)));
-            add("  H_m0", format!("{} m", four(s.h_m0_m)));
-            add("  T_p (f_p)", format!("{} s ({} Hz)", four(s.t_p_s), four(s.f_p_hz)));
-            add("  T_m01, T_m02, T_e", format!("{}, {}, {} s", four(s.t_m01_s), four(s.t_m02_s), four(s.t_e_s)));
+            add("  H_m0", with_bounds(s.h_m0_m, s.h_m0_m_low, s.h_m0_m_high, "m"));
+            add("  T_p", with_bounds(s.t_p_s, s.t_p_s_low, s.t_p_s_high, "s"));
+            add("  f_p", format!("{} Hz", four(s.f_p_hz)));
+            add("  T_m01", with_bounds(s.t_m01_s, s.t_m01_s_low, s.t_m01_s_high, "s"));
+            add("  T_m02", with_bounds(s.t_m02_s, s.t_m02_s_low, s.t_m02_s_high, "s"));
+            add("  T_e", with_bounds(s.t_e_s, s.t_e_s_low, s.t_e_s_high, "s"));
             add("  m0", format!("{:.4e} m²", s.m0));
         }
     }
@@ -199,7 +233,8 @@ pub(super) fn spectrum(burst: &Burst) -> Result<Chart, ChartError> {
 }
 
 fn page(report: &WavesReport, options: &WavesOptions) -> Result<Page, ChartError> {
-    let mut page = Page::new(format!("Waves of {}", options.input.display()));
+    let name = options.input.file_name().unwrap_or(options.input.as_os_str());
+    let mut page = Page::new(format!("Waves of {}", name.display()));
     let bursts = if report.bursts.is_empty() { std::slice::from_ref(&report.first) } else { &report.bursts[..] };
     for (i, burst) in bursts.iter().enumerate() {
         if bursts.len() > 1 {

@@ -14,8 +14,11 @@ pub struct Page {
 const STYLE: &str = "body{font:16px/1.5 system-ui,sans-serif;max-width:62rem;margin:2rem auto;padding:0 1rem;color:#1b1b1b;background:#fff}\
 h1{font-size:1.7rem;margin-bottom:.2rem}h2{font-size:1.2rem;margin-top:2rem;border-bottom:1px solid #ddd}\
 table{border-collapse:collapse;margin:.8rem 0;font-variant-numeric:tabular-nums}\
-td,th{padding:.2rem .8rem;border-bottom:1px solid #e3e3e3;text-align:right}td:first-child,th:first-child{text-align:left}\
+td,th{padding:.2rem .8rem;border-bottom:1px solid #e3e3e3;text-align:right}td:first-child,th:first-child,td.text{text-align:left}\
 figure{margin:1rem 0}figcaption{color:#555;font-size:.9rem}svg,img{max-width:100%;height:auto}";
+
+/// A cell of more is a sentence.
+const SENTENCE_LEN: usize = 48;
 
 impl Page {
     /// An empty page.
@@ -46,7 +49,9 @@ impl Page {
         for row in rows {
             self.body.push_str("<tr>");
             for cell in row.as_ref() {
-                let _ = write!(self.body, "<td>{}</td>", escaped(cell));
+                // Sentences read from the left, numbers line up on the right.
+                let class = if cell.len() > SENTENCE_LEN { " class=\"text\"" } else { "" };
+                let _ = write!(self.body, "<td{class}>{}</td>", escaped(cell));
             }
             self.body.push_str("</tr>\n");
         }

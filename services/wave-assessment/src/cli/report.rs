@@ -1,9 +1,10 @@
 //! What `halcyon waves` prints: numbers with their units in their names, and 95 % intervals as `x_low` and `x_high`.
 
 use halcyon_ocean::crossing::{Crossing, Wave, WaveStatistics, waves};
+use halcyon_ocean::interval::{Interval, SpectralIntervals, WaveIntervals};
 use halcyon_ocean::quality::{Assessment, Even, Finding};
 use halcyon_ocean::record::RecordError;
-use halcyon_ocean::{SampledSpectrum, Welch};
+use halcyon_ocean::{Record, SampledSpectrum, Welch};
 use serde::Serialize;
 
 use crate::table::Readings;
@@ -78,27 +79,66 @@ pub struct Burst {
     pub waves: Vec<Wave>,
 }
 
-/// Statistics of single waves.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-#[allow(missing_docs, reason = "as halcyon_ocean::WaveStatistics has them")]
-pub struct ZeroCrossing {
-    pub waves: usize,
-    pub h_mean_m: f64,
-    pub h_rms_m: f64,
-    pub h_s_m: f64,
-    pub h_tenth_m: f64,
-    pub h_max_m: f64,
-    pub t_z_s: f64,
-    pub t_third_s: f64,
-    pub crest_max_m: f64,
-    pub trough_min_m: f64,
+/// Declares numbers, some of which have 95 % intervals as siblings.
+macro_rules! with_intervals {
+    ($(#[$doc:meta])* $name:ident { $($plain:ident: $type:ty,)* } $($value:ident, $low:ident, $high:ident;)*) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+        #[allow(missing_docs, reason = "as halcyon_ocean has them")]
+        pub struct $name {
+            $(pub $plain: $type,)*
+            $(
+                pub $value: f64,
+                #[serde(skip_serializing_if = "Option::is_none")]
+                pub $low: Option<f64>,
+                #[serde(skip_serializing_if = "Option::is_none")]
+                pub $high: Option<f64>,
+            )*
+        }
+    };
 }
 
-impl From<WaveStatistics> for ZeroCrossing {
-    fn from(of: WaveStatistics) -> Self {
-        let WaveStatistics { waves, h_mean_m, h_rms_m, h_s_m, h_tenth_m, h_max_m, .. } = of;
-        let WaveStatistics { t_z_s, t_third_s, crest_max_m, trough_min_m, .. } = of;
-        Self { waves, h_mean_m, h_rms_m, h_s_m, h_tenth_m, h_max_m, t_z_s, t_third_s, crest_max_m, trough_min_m }
+with_intervals! {
+    /// Statistics of single waves; bounds are absent where there are too few waves. Highest wave, crest and trough are facts of the record.
+    ZeroCrossing { waves: usize, h_max_m: f64, crest_max_m: f64, trough_min_m: f64, }
+    h_mean_m, h_mean_m_low, h_mean_m_high;
+    h_rms_m, h_rms_m_low, h_rms_m_high;
+    h_s_m, h_s_m_low, h_s_m_high;
+    h_tenth_m, h_tenth_m_low, h_tenth_m_high;
+    t_z_s, t_z_s_low, t_z_s_high;
+    t_third_s, t_third_s_low, t_third_s_high;
+}
+
+impl ZeroCrossing {
+    fn of(waves: &[Wave]) -> Option<Self> {
+        let found = WaveStatistics::of(waves)?;
+        let bounds = WaveIntervals::of(waves);
+        let low = |pick: fn(&WaveIntervals) -> Interval| bounds.as_ref().map(|bounds| pick(bounds).0);
+        let high = |pick: fn(&WaveIntervals) -> Interval| bounds.as_ref().map(|bounds| pick(bounds).1);
+        Some(Self {
+            waves: found.waves,
+            h_max_m: found.h_max_m,
+            crest_max_m: found.crest_max_m,
+            trough_min_m: found.trough_min_m,
+            h_mean_m: found.h_mean_m,
+            h_mean_m_low: low(|b| b.h_mean_m),
+            h_mean_m_high: high(|b| b.h_mean_m),
+            h_rms_m: found.h_rms_m,
+            h_rms_m_low: low(|b| b.h_rms_m),
+            h_rms_m_high: high(|b| b.h_rms_m),
+            h_s_m: found.h_s_m,
+            h_s_m_low: low(|b| b.h_s_m),
+            h_s_m_high: high(|b| b.h_s_m),
+            h_tenth_m: found.h_tenth_m,
+            h_tenth_m_low: low(|b| b.h_tenth_m),
+            h_tenth_m_high: high(|b| b.h_tenth_m),
+            t_z_s: found.t_z_s,
+            t_z_s_low: low(|b| b.t_z_s),
+            t_z_s_high: high(|b| b.t_z_s),
+            t_third_s: found.t_third_s,
+            t_third_s_low: low(|b| b.t_third_s),
+            t_third_s_high: high(|b| b.t_third_s),
+        })
     }
 }
 
@@ -111,23 +151,52 @@ pub struct Band {
     pub high_hz: f64,
 }
 
-/// Statistics of a spectrum.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-#[allow(missing_docs, reason = "as halcyon_ocean::SpectralStatistics has them")]
-pub struct Spectrum {
-    pub band: Band,
-    pub h_m0_m: f64,
-    pub t_p_s: f64,
-    pub f_p_hz: f64,
-    pub t_m01_s: f64,
-    pub t_m02_s: f64,
-    pub t_e_s: f64,
-    pub m_minus1: f64,
-    pub m0: f64,
-    pub m1: f64,
-    pub m2: f64,
-    pub m3: f64,
-    pub m4: f64,
+with_intervals! {
+    /// Statistics of a spectrum; moments in m² Hzⁿ.
+    Spectrum {
+        band: Band, degrees_of_freedom: Option<f64>, f_p_hz: f64, m_minus1: f64, m0: f64, m1: f64, m2: f64, m3: f64, m4: f64,
+    }
+    h_m0_m, h_m0_m_low, h_m0_m_high;
+    t_p_s, t_p_s_low, t_p_s_high;
+    t_m01_s, t_m01_s_low, t_m01_s_high;
+    t_m02_s, t_m02_s_low, t_m02_s_high;
+    t_e_s, t_e_s_low, t_e_s_high;
+}
+
+impl Spectrum {
+    fn of(record: &Record, density: &SampledSpectrum, (low_hz, high_hz): (f64, f64)) -> Option<Self> {
+        let found = density.statistics(low_hz, high_hz)?;
+        let bounds = SpectralIntervals::of(record, density, &found, (low_hz, high_hz));
+        let moment = |order| density.moment(order, low_hz, high_hz);
+        let low = |pick: fn(&SpectralIntervals) -> Interval| bounds.as_ref().map(|bounds| pick(bounds).0);
+        let high = |pick: fn(&SpectralIntervals) -> Interval| bounds.as_ref().map(|bounds| pick(bounds).1);
+        Some(Self {
+            band: Band { low_hz, high_hz },
+            degrees_of_freedom: bounds.as_ref().map(|bounds| bounds.degrees_of_freedom),
+            f_p_hz: found.f_p_hz,
+            m_minus1: moment(-1),
+            m0: found.m0_m2,
+            m1: moment(1),
+            m2: moment(2),
+            m3: moment(3),
+            m4: moment(4),
+            h_m0_m: found.h_m0_m,
+            h_m0_m_low: low(|b| b.h_m0_m),
+            h_m0_m_high: high(|b| b.h_m0_m),
+            t_p_s: found.t_p_s,
+            t_p_s_low: low(|b| b.t_p_s),
+            t_p_s_high: high(|b| b.t_p_s),
+            t_m01_s: found.t_m01_s,
+            t_m01_s_low: low(|b| b.t_m01_s),
+            t_m01_s_high: high(|b| b.t_m01_s),
+            t_m02_s: found.t_m02_s,
+            t_m02_s_low: low(|b| b.t_m02_s),
+            t_m02_s_high: high(|b| b.t_m02_s),
+            t_e_s: found.t_e_s,
+            t_e_s_low: low(|b| b.t_e_s),
+            t_e_s_high: high(|b| b.t_e_s),
+        })
+    }
 }
 
 /// A quality test's flag.
@@ -162,27 +231,9 @@ impl Burst {
     pub(super) fn new(even: &Even, assessment: &Assessment, segment_s: f64, band_hz: (f64, f64)) -> Result<Self, RecordError> {
         let mean_m = even.record.mean_m();
         let record = even.record.clone().without_trend();
-        let of = |crossing| WaveStatistics::of(&waves(&record, crossing, 0.0)).map(ZeroCrossing::from);
+        let up = waves(&record, Crossing::Up, 0.0);
         let density = Welch::with_segments_of_s(segment_s, &record).spectrum(&record)?;
-        let (low_hz, high_hz) = (band_hz.0, band_hz.1.min(0.5 * record.rate_hz()));
-        let spectrum = density.statistics(low_hz, high_hz).map(|found| {
-            let moment = |order| density.moment(order, low_hz, high_hz);
-            Spectrum {
-                band: Band { low_hz, high_hz },
-                h_m0_m: found.h_m0_m,
-                t_p_s: found.t_p_s,
-                f_p_hz: found.f_p_hz,
-                t_m01_s: found.t_m01_s,
-                t_m02_s: found.t_m02_s,
-                t_e_s: found.t_e_s,
-                m_minus1: moment(-1),
-                m0: found.m0_m2,
-                m1: moment(1),
-                m2: moment(2),
-                m3: moment(3),
-                m4: moment(4),
-            }
-        });
+        let band_hz = (band_hz.0, band_hz.1.min(0.5 * record.rate_hz()));
         Ok(Self {
             samples: record.samples_m().len(),
             filled: even.filled.iter().filter(|filled| **filled).count(),
@@ -191,12 +242,12 @@ impl Burst {
             duration_s: record.duration_s(),
             mean_m,
             deviation_m: record.variance_m2().sqrt(),
-            zero_up: of(Crossing::Up),
-            zero_down: of(Crossing::Down),
-            spectrum,
+            zero_up: ZeroCrossing::of(&up),
+            zero_down: ZeroCrossing::of(&waves(&record, Crossing::Down, 0.0)),
+            spectrum: Spectrum::of(&record, &density, band_hz),
             quality: assessment.findings.iter().map(FlagReport::from).collect(),
             density: Some(density),
-            waves: waves(&record, Crossing::Up, 0.0),
+            waves: up,
             elevation_m: record.samples_m().to_vec(),
         })
     }

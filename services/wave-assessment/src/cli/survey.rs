@@ -4,6 +4,7 @@ use halcyon_model::{Estimate, IdError, RigId, SeaState, Stamp, SurfacePatch};
 use halcyon_ocean::quality::RawSeries;
 use serde::Serialize;
 
+use super::verdict::{ReasonReport, VerdictReport};
 use super::{Burst, analyse};
 use crate::config::Config;
 use crate::core::Assessor;
@@ -102,28 +103,6 @@ estimates! {
     t_z_s, t_z_s_low, t_z_s_high;
     /// Root mean square slope, radians.
     slope_rms_rad, slope_rms_rad_low, slope_rms_rad_high;
-}
-
-/// A verdict, as `--json` prints it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct VerdictReport {
-    /// `safe`, `unsafe` or `inconclusive`.
-    pub state: &'static str,
-    /// Every check in words, those that failed first.
-    pub reasons: Vec<ReasonReport>,
-    /// Seconds of the survey's stamps after which it means nothing.
-    pub valid_until: f64,
-}
-
-/// One check.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ReasonReport {
-    /// Its name.
-    pub check: String,
-    /// Whether it passed.
-    pub passed: bool,
-    /// In words.
-    pub text: String,
 }
 
 impl Survey {

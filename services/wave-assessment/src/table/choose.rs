@@ -7,7 +7,7 @@ const RATE_DISAGREEMENT_MAX: f64 = 0.05;
 
 /// What the user says about a table; what is not said is told from the names of its columns, or else from what they hold.
 ///
-/// Time: the column named so (`time`, `t`, `stamp`, `date` …); otherwise, of several columns, the first if it only rises. With a rate
+/// Time: the column named so (`time`, `t`, `stamp`, `date` …); otherwise, of several columns, the first if it rises. With a rate
 /// and no named column, readings are taken as evenly spaced. Elevation: the column named so (`eta`, `elevation`, `level`, `z` …);
 /// otherwise the only one that is left.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -259,17 +259,14 @@ fn is_called(name: &str, words: &[&str]) -> bool {
     words.iter().any(|word| first.eq_ignore_ascii_case(word))
 }
 
-/// Whether stamps only rise, but for those that are missing.
+/// Whether a column rises as stamps do, some of them missing or out of order: it gets somewhere by its steps, where waves go to and fro.
 fn rises(stamps: &[f64]) -> bool {
-    let mut last = f64::NEG_INFINITY;
-    let mut known = 0_usize;
-    let all = stamps.iter().filter(|stamp| !stamp.is_nan()).all(|stamp| {
-        let rises = *stamp > last;
-        last = *stamp;
-        known += 1;
-        rises
-    });
-    all && known > 1 && known * 2 > stamps.len()
+    /// Of the way that the steps make together.
+    const NET_MIN: f64 = 0.3;
+    let known: Vec<f64> = stamps.iter().copied().filter(|stamp| !stamp.is_nan()).collect();
+    let (Some(first), Some(last)) = (known.first(), known.last()) else { return false };
+    let way: f64 = known.windows(2).map(|pair| (pair[1] - pair[0]).abs()).sum();
+    known.len() > 1 && known.len() * 2 > stamps.len() && last - first > NET_MIN * way
 }
 
 /// Whether stamps are a stated rate's.
