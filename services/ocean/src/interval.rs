@@ -173,7 +173,7 @@ impl SpectralIntervals {
         (low_hz, high_hz): Interval,
     ) -> Option<Self> {
         // What smears a peak lowers the square under it: a third of the record tells it better than the segments of a steady spectrum.
-        let fine = Welch { segment_samples: (record.samples_m().len() / 3).max(Record::SAMPLES_MIN) }.spectrum(record).ok()?;
+        let fine = Welch::new((record.samples_m().len() / 3).max(Record::SAMPLES_MIN)).spectrum(record).ok()?;
         let duration_s = record.duration_s();
         let df_hz = fine.df_hz();
         // A line of so many segments is the true density times a chi-square variable, whose square is too high by this.

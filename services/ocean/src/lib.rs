@@ -41,4 +41,4 @@ pub use record::{Record, RecordError};
 pub use spectrum::{Jonswap, PiersonMoskowitz, Spectrum, SpectrumError};
 pub use spline::Spline;
 pub use spreading::CosTwoS;
-pub use welch::{SampledSpectrum, SpectralStatistics, Welch};
+pub use welch::{SampledSpectrum, SpectralStatistics, Taper, Welch};

@@ -6,6 +6,7 @@ mod verdict;
 
 use std::path::{Path, PathBuf};
 
+use halcyon_ocean::Taper;
 use halcyon_ocean::quality::readings::ReadingLimits;
 use halcyon_ocean::quality::{Finding, Flag, Limits, RawSeries, assess};
 
@@ -31,6 +32,8 @@ pub struct WavesOptions {
     pub band_hz: (f64, f64),
     /// Length of the spectrum's segments, seconds.
     pub segment_s: f64,
+    /// What they are multiplied by.
+    pub taper: Taper,
 }
 
 /// Why a file has no waves to speak of.
@@ -167,18 +170,18 @@ fn bursts(raw: RawSeries<'_>, burst_s: f64, options: &WavesOptions) -> Result<Ve
 }
 
 fn burst(raw: RawSeries<'_>, options: &WavesOptions) -> Result<Burst, WavesError> {
-    analyse(raw, options.segment_s, options.band_hz)
+    analyse(raw, options.segment_s, options.taper, options.band_hz)
         .map_err(|reason| WavesError::NoRecord { path: options.input.clone(), reason })
 }
 
 /// One record's quality and statistics; in words why there are none.
-fn analyse(raw: RawSeries<'_>, segment_s: f64, band_hz: (f64, f64)) -> Result<Burst, String> {
+fn analyse(raw: RawSeries<'_>, segment_s: f64, taper: Taper, band_hz: (f64, f64)) -> Result<Burst, String> {
     // What is rejected is filled in, and a crest that was real would be lost: an hour at 10 Hz of a Gaussian sea reaches 4.2 deviations on
     // average, and 6 once in 14,000 such hours.
     let readings = ReadingLimits { spike_sigmas: 6.0, ..ReadingLimits::default() };
     let assessment = assess(raw, &Limits { segment_s, readings, ..Limits::default() });
     let Some(even) = &assessment.even else { return Err(why_none(&assessment.findings)) };
-    Burst::new(even, &assessment, segment_s, band_hz).map_err(|error| error.to_string())
+    Burst::new(even, &assessment, (segment_s, taper), band_hz).map_err(|error| error.to_string())
 }
 
 /// What is wrong with readings that make no record, in words.

@@ -4,6 +4,7 @@ use std::f64::consts::{PI, SQRT_2, TAU};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
+use halcyon_ocean::Taper;
 use halcyon_wave_assessment::Config;
 use halcyon_wave_assessment::cli::{WavesError, WavesOptions, WavesReport, verdict, waves};
 use halcyon_wave_assessment::table::Choice;
@@ -25,7 +26,7 @@ impl Files {
 
 fn options(input: PathBuf, rate_hz: Option<f64>) -> WavesOptions {
     let choice = Choice { rate_hz, ..Choice::default() };
-    WavesOptions { input, choice, burst_s: None, band_hz: (0.05, f64::INFINITY), segment_s: 64.0 }
+    WavesOptions { input, choice, burst_s: None, band_hz: (0.05, f64::INFINITY), segment_s: 64.0, taper: Taper::Hann }
 }
 
 fn table(samples: usize, rate_hz: f64, elevation_m: impl Fn(f64) -> f64) -> String {
@@ -178,21 +179,31 @@ fn the_published_record_has_its_published_waves() {
         println!("NOT CHECKED: {} is not there (set HALCYON_OCEANLYZ)", path.display());
         return;
     }
-    let options = WavesOptions { burst_s: Some(1024.0), band_hz: (0.05, 1.0), ..options(path, Some(2.0)) };
+    let options = WavesOptions {
+        burst_s: Some(1024.0),
+        band_hz: (0.05, 1.0),
+        segment_s: 128.0,
+        ..options(path, Some(2.0))
+    };
     let report = waves(&options).unwrap();
-    // H_s, H_z, T_z, T_s as published, two decimals.
+    // H_m0, T_p, f_p, H_s, H_z, T_z, T_s as published, two decimals.
     let published = [
-        [0.59, 0.39, 2.61, 2.88],
-        [0.53, 0.34, 2.44, 2.71],
-        [0.32, 0.20, 1.94, 2.13],
-        [0.77, 0.48, 2.74, 3.14],
-        [0.41, 0.26, 2.25, 2.49],
+        [0.64, 3.01, 0.33, 0.59, 0.39, 2.61, 2.88],
+        [0.59, 2.84, 0.35, 0.53, 0.34, 2.44, 2.71],
+        [0.36, 2.21, 0.45, 0.32, 0.20, 1.94, 2.13],
+        [0.83, 3.28, 0.30, 0.77, 0.48, 2.74, 3.14],
+        [0.47, 2.61, 0.38, 0.41, 0.26, 2.25, 2.49],
     ];
     assert_eq!(report.bursts.len(), 5);
     for (burst, expected) in report.bursts.iter().zip(published) {
-        let z = burst.zero_up.unwrap();
-        for (found, expected) in [z.h_s_m, z.h_mean_m, z.t_z_s, z.t_third_s].into_iter().zip(expected) {
-            assert!((found - expected).abs() <= 0.005 + 1e-9, "{found} for {expected}");
+        let (z, s) = (burst.zero_up.unwrap(), burst.spectrum.unwrap());
+        let found = [s.h_m0_m, s.t_p_s, s.f_p_hz, z.h_s_m, z.h_mean_m, z.t_z_s, z.t_third_s];
+        println!("{}", found.map(|x| format!("{x:.4}")).join("  "));
+        // Waves are defined; a spectrum's estimate is not: how the package cuts and windows is not published with the table, and no common
+        // way gives all of its values. What is a tenth of their intervals apart agrees.
+        let tolerances = [0.02, 0.07, 0.01, 0.005, 0.005, 0.005, 0.005];
+        for ((found, expected), tolerance) in found.into_iter().zip(expected).zip(tolerances) {
+            assert!((found - expected).abs() <= tolerance + 1e-9, "{found} for {expected}");
         }
     }
 }

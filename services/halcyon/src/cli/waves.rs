@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use halcyon_chassis::{ConfigError, Options};
+use halcyon_ocean::Taper;
 use halcyon_reconstruction::files::{Output, check_outputs, has_ending, write_bytes};
 use halcyon_wave_assessment::Config;
 use halcyon_wave_assessment::cli::{self, Burst, VerdictReport, WavesOptions, WavesReport, ZeroCrossing};
@@ -58,12 +59,33 @@ pub(super) struct Args {
     /// Length of the spectrum's segments, seconds
     #[arg(long, value_name = "S", default_value_t = 128.0, allow_negative_numbers = true)]
     segment: f64,
+    /// Their window
+    #[arg(long, value_enum, default_value_t = Window::Hann)]
+    window: Window,
     /// Draw it: .svg (the spectrum) or .html (everything)
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
     /// Print the result as JSON
     #[arg(long)]
     json: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Window {
+    Hann,
+    Hamming,
+    /// None at all: with one segment the plain periodogram
+    Rectangle,
+}
+
+impl Window {
+    fn taper(self) -> Taper {
+        match self {
+            Self::Hann => Taper::Hann,
+            Self::Hamming => Taper::Hamming,
+            Self::Rectangle => Taper::Rectangle,
+        }
+    }
 }
 
 fn length_unit(text: &str) -> Result<LengthUnit, String> {
@@ -95,6 +117,7 @@ pub(super) fn run(options: &Options, args: &Args) -> anyhow::Result<ExitCode> {
         burst_s: args.burst,
         band_hz: (args.band_low, args.band_high),
         segment_s: args.segment,
+        taper: args.window.taper(),
     };
     let report = cli::waves(&options).map_err(bad_input)?;
     if let Some(path) = &args.plot {

@@ -4,7 +4,7 @@ use halcyon_ocean::crossing::{Crossing, Wave, WaveStatistics, waves};
 use halcyon_ocean::interval::{Interval, SpectralIntervals, WaveIntervals};
 use halcyon_ocean::quality::{Assessment, Even, Finding};
 use halcyon_ocean::record::RecordError;
-use halcyon_ocean::{Record, SampledSpectrum, Welch};
+use halcyon_ocean::{Record, SampledSpectrum, Taper, Welch};
 use serde::Serialize;
 
 use crate::table::Readings;
@@ -228,11 +228,16 @@ impl From<&Finding> for FlagReport {
 }
 
 impl Burst {
-    pub(super) fn new(even: &Even, assessment: &Assessment, segment_s: f64, band_hz: (f64, f64)) -> Result<Self, RecordError> {
+    pub(super) fn new(
+        even: &Even,
+        assessment: &Assessment,
+        (segment_s, taper): (f64, Taper),
+        band_hz: (f64, f64),
+    ) -> Result<Self, RecordError> {
         let mean_m = even.record.mean_m();
         let record = even.record.clone().without_trend();
         let up = waves(&record, Crossing::Up, 0.0);
-        let density = Welch::with_segments_of_s(segment_s, &record).spectrum(&record)?;
+        let density = Welch { taper, ..Welch::with_segments_of_s(segment_s, &record) }.spectrum(&record)?;
         let band_hz = (band_hz.0, band_hz.1.min(0.5 * record.rate_hz()));
         Ok(Self {
             samples: record.samples_m().len(),

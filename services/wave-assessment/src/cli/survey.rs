@@ -1,6 +1,7 @@
 //! What `halcyon survey` makes of the patches of a folder: the sea state of all of them.
 
 use halcyon_model::{Estimate, IdError, RigId, SeaState, Stamp, SurfacePatch};
+use halcyon_ocean::Taper;
 use halcyon_ocean::quality::RawSeries;
 use serde::Serialize;
 
@@ -138,7 +139,9 @@ impl Survey {
         let seconds = |stamp: Stamp| stamp.as_nanos() as f64 * 1e-9;
         let (stamp_s, elevation_m): (Vec<f64>, Vec<f64>) =
             sea.trace.iter().map(|point| (seconds(point.stamp), point.elevation_m)).unzip();
-        let centre = analyse(RawSeries { stamp_s: &stamp_s, elevation_m: &elevation_m }, segment_s, (0.05, f64::INFINITY)).ok();
+        let centre =
+            analyse(RawSeries { stamp_s: &stamp_s, elevation_m: &elevation_m }, segment_s, Taper::Hann, (0.05, f64::INFINITY))
+                .ok();
         let reasons = sea.verdict.reasons.iter().map(|reason| ReasonReport {
             check: reason.check.clone(),
             passed: reason.passed,
