@@ -46,6 +46,15 @@ pub(super) fn bar(what: &'static str) -> ProgressBar {
     if let Ok(style) = style { bar.with_style(style) } else { bar }
 }
 
+/// One step of something long is done: above the bar, or as a line of its own where stderr is no terminal.
+pub(super) fn step(bar: &ProgressBar, text: &str) {
+    if std::io::stderr().is_terminal() {
+        bar.println(text);
+    } else {
+        eprintln!("{text}");
+    }
+}
+
 /// A spinner on stderr for what has no known length; nothing where stderr is no terminal.
 pub(super) fn spinner() -> ProgressBar {
     let spinner = ProgressBar::with_draw_target(None, target());
