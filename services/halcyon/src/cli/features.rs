@@ -67,7 +67,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let report = report.map_err(bad_input)?;
     // What there is, is shown; that a file asked for is not there is a failure all the same.
     for cloud in &report.missing {
-        eprintln!("error: --cloud {} is not written: {}", cloud.path.display(), cloud.why);
+        output::note(&format!("error: --cloud {} is not written: {}", cloud.path.display(), cloud.why));
     }
     let code = if report.missing.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE };
     if args.json {

@@ -19,10 +19,15 @@ pub(super) fn line(text: &str) -> anyhow::Result<()> {
     }
 }
 
+/// A line on stderr. Whoever has closed it does not want it.
+pub(super) fn note(text: &str) {
+    let _ = writeln!(std::io::stderr(), "{text}");
+}
+
 /// Warnings go to stderr, beside JSON and beside text; JSON has them, too.
 pub(super) fn warnings(texts: &[String]) {
     for text in texts {
-        eprintln!("warning: {text}");
+        note(&format!("warning: {text}"));
     }
 }
 
@@ -51,7 +56,7 @@ pub(super) fn step(bar: &ProgressBar, text: &str) {
     if std::io::stderr().is_terminal() {
         bar.println(text);
     } else {
-        eprintln!("{text}");
+        note(text);
     }
 }
 

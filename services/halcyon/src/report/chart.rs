@@ -165,7 +165,7 @@ impl Chart {
                             let drawn = drawn.label(name);
                             if series.style == Style::Dashed {
                                 drawn.legend(move |(x, y)| {
-                                    plotters::element::DashedPathElement::new([(x, y), (x + 20, y)].into_iter(), 6, 4, stroke)
+                                    plotters::element::DashedPathElement::new([(x, y), (x + 20, y)], 6, 4, stroke)
                                 });
                             } else {
                                 drawn.legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 20, y)], stroke));

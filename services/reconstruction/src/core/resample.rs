@@ -143,8 +143,8 @@ impl Lanes {
     fn next_whole(&mut self) -> Option<i32> {
         let after = self.whole.unwrap_or(i32::MIN);
         let mut larger = [i32::MAX; LANES];
-        for lane in 0..LANES {
-            larger[lane] = if self.wholes[lane] > after { self.wholes[lane] } else { i32::MAX };
+        for (larger, whole) in larger.iter_mut().zip(self.wholes) {
+            *larger = if whole > after { whole } else { i32::MAX };
         }
         let next = least(larger);
         self.whole = (next != i32::MAX).then_some(next);
@@ -225,7 +225,7 @@ pub(crate) fn warp_row(warp: &Warp, row: usize, scratch: &mut Row, exact: &mut [
     scratch.repeat_ends();
     shifted(scratch, warp.across_px, exact);
     for (grey, exact) in grey.iter_mut().zip(exact) {
-        *grey = small_whole((*exact + 0.5).max(0.0).min(255.0).floor()) as u8;
+        *grey = small_whole((*exact + 0.5).clamp(0.0, 255.0).floor()) as u8;
     }
 }
 
