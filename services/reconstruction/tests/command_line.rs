@@ -287,7 +287,8 @@ fn what_lies_beyond_the_range_is_no_match() {
         let map = pfm::decode(&std::fs::read(&out).unwrap()).unwrap();
         assert!(map.values_px.iter().all(|value| value.is_nan() || *value <= 17.0), "{engine}");
         assert!((map.density() - report.density).abs() < 1e-12, "{engine}: what is dropped is not counted");
-        assert!(run(21.0).density > 0.6 && report.density < 0.5, "{engine} {}", report.density);
+        let within = run(21.0).density;
+        assert!(within > 0.6 && report.density < 0.9 * within, "{engine} {} {within}", report.density);
     }
 }
 

@@ -1,5 +1,6 @@
 //! What `halcyon waves` does: a file of readings in, every statistic of its waves out. No arguments are parsed and nothing is printed here.
 
+mod crests;
 mod report;
 mod survey;
 mod verdict;
@@ -10,6 +11,7 @@ use halcyon_ocean::Taper;
 use halcyon_ocean::quality::readings::ReadingLimits;
 use halcyon_ocean::quality::{Finding, Flag, Limits, RawSeries, assess};
 
+pub use crests::CrestReport;
 pub use report::{Band, Burst, FlagReport, Spectrum, WavesReport, ZeroCrossing};
 pub use survey::{Heights, SeaReport, Survey, SurveyError};
 pub use verdict::{ReasonReport, VerdictReport, verdict};

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use halcyon_chassis::{ConfigError, Options};
 use halcyon_ocean::Taper;
+use halcyon_ocean::crests::ExceedancePoint;
 use halcyon_reconstruction::files::{Output, check_outputs, has_ending, write_bytes};
 use halcyon_wave_assessment::Config;
 use halcyon_wave_assessment::cli::{self, Burst, VerdictReport, WavesOptions, WavesReport, ZeroCrossing};
@@ -196,7 +197,7 @@ fn print_burst(burst: &Burst) -> anyhow::Result<()> {
         four(burst.deviation_m)
     ))?;
     for (name, row) in rows(burst) {
-        output::line(&format!("{name:<32} {row}"))?;
+        output::line(&format!("{name:<36} {row}"))?;
     }
     for flag in burst.quality.iter().filter(|flag| flag.flag >= 3) {
         output::line(&format!("{} {}: {}", flag.test, if flag.flag == 3 { "suspect" } else { "failed" }, flag.reason))?;
@@ -244,7 +245,38 @@ pub(super) fn rows(burst: &Burst) -> Vec<(String, String)> {
             add("  m0", format!("{:.4e} m²", s.m0));
         }
     }
+    for of in &burst.crest_statistics {
+        add(
+            &format!("highest of {}, {}", of.of, of.theory),
+            format!(
+                "{} m (95 %: {} to {} m), seen {} m; Kolmogorov-Smirnov p {:.2}",
+                four(of.highest_m),
+                four(of.highest_m_low),
+                four(of.highest_m_high),
+                four(of.observed_m),
+                of.ks_probability
+            ),
+        );
+    }
     rows
+}
+
+/// How often heights are exceeded, seen and by theory.
+fn exceedance(burst: &Burst, of: &str) -> Chart {
+    let mut chart = Chart::new(format!("{of}, m"), "exceeded by, share").log_y();
+    for (number, report) in burst.crest_statistics.iter().filter(|report| report.of == of).enumerate() {
+        let points =
+            |pick: fn(&ExceedancePoint) -> f64| report.points.iter().map(|point| (point.value_m, pick(point))).collect();
+        // Observations are the same for all but those that begin at a threshold.
+        if number == 0 {
+            chart = chart.with(Series::points("seen", points(|point| point.observed)));
+        }
+        let is_whole = report.theory != "Boccotti";
+        if is_whole {
+            chart = chart.with(Series::line(report.theory, points(|point| point.theory)));
+        }
+    }
+    chart
 }
 
 pub(super) fn spectrum(burst: &Burst) -> Result<Chart, ChartError> {
@@ -283,6 +315,13 @@ pub(super) fn draw(page: &mut Page, burst: &Burst) -> Result<(), ChartError> {
     page.figure(&elevation.svg()?, "Elevation about its trend");
     if let Ok(svg) = spectrum(burst).and_then(|chart| chart.svg()) {
         page.figure(&svg, "Variance density spectrum");
+    }
+    for (of, caption) in
+        [("crests", "Crests above the mean, seen and by theory"), ("heights", "Wave heights, seen and by theory")]
+    {
+        if let Ok(svg) = exceedance(burst, of).svg() {
+            page.figure(&svg, caption);
+        }
     }
     let numbers: Vec<[String; 2]> = rows(burst).into_iter().map(|(name, value)| [name, value]).collect();
     page.table(&["quantity", "value"], &numbers);

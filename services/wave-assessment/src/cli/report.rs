@@ -7,6 +7,7 @@ use halcyon_ocean::record::RecordError;
 use halcyon_ocean::{Record, SampledSpectrum, Taper, Welch};
 use serde::Serialize;
 
+use super::crests::{CrestReport, crests};
 use crate::table::Readings;
 
 /// A file's waves.
@@ -66,6 +67,8 @@ pub struct Burst {
     /// From the spectrum; absent where it holds no energy.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spectrum: Option<Spectrum>,
+    /// Crests and heights against theories; empty with too few waves.
+    pub crest_statistics: Vec<CrestReport>,
     /// Every quality test.
     pub quality: Vec<FlagReport>,
     /// The density spectrum, for plots.
@@ -239,6 +242,8 @@ impl Burst {
         let up = waves(&record, Crossing::Up, 0.0);
         let density = Welch { taper, ..Welch::with_segments_of_s(segment_s, &record) }.spectrum(&record)?;
         let band_hz = (band_hz.0, band_hz.1.min(0.5 * record.rate_hz()));
+        let spectrum = Spectrum::of(&record, &density, band_hz);
+        let crest_statistics = spectrum.as_ref().map_or_else(Vec::new, |spectrum| crests(&up, spectrum, &density));
         Ok(Self {
             samples: record.samples_m().len(),
             filled: even.filled.iter().filter(|filled| **filled).count(),
@@ -249,7 +254,8 @@ impl Burst {
             deviation_m: record.variance_m2().sqrt(),
             zero_up: ZeroCrossing::of(&up),
             zero_down: ZeroCrossing::of(&waves(&record, Crossing::Down, 0.0)),
-            spectrum: Spectrum::of(&record, &density, band_hz),
+            spectrum,
+            crest_statistics,
             quality: assessment.findings.iter().map(FlagReport::from).collect(),
             density: Some(density),
             waves: up,
