@@ -196,17 +196,17 @@ pub fn self_calibrate(
 ) -> Result<SelfCalibrateReport, SelfCalibrateCliError> {
     let method: Method = options.method.parse()?;
     let settings = settings(options)?;
-    let rig = read_rig(options.rig)?;
     let (left, right) = (glob(options.left)?, glob(options.right)?);
     if left.len() != right.len() {
         return Err(SelfCalibrateCliError::Unpaired { left: left.len(), right: right.len() });
     }
     if let Some(out) = options.out {
         let pictures = left.iter().map(|path| ("--left", path)).chain(right.iter().map(|path| ("--right", path)));
-        let rig = rig_files(options.rig);
-        let inputs = pictures.chain(rig.iter().map(|path| ("--rig", path))).map(|(option, path)| (option, path.as_path()));
+        let files = rig_files(options.rig);
+        let inputs = pictures.chain(files.iter().map(|path| ("--rig", path))).map(|(option, path)| (option, path.as_path()));
         check_outputs(inputs, &[Output::file("--out", out, &["yaml", "yml"])]).map_err(FileError::from)?;
     }
+    let rig = read_rig(options.rig)?;
     let read = |path: &Path| {
         let image = read_picture(path)?;
         if (image.width_px(), image.height_px()) == (rig.width_px, rig.height_px) {
