@@ -90,6 +90,23 @@ impl Record {
         self.samples_m.iter().map(|x| (x - mean_m).powi(2)).sum::<f64>() / self.samples_m.len() as f64
     }
 
+    /// Skewness ⟨x³⟩/⟨x²⟩^1.5 about the mean: above 0 where crests are higher than troughs are deep; NaN for a flat record.
+    #[must_use]
+    pub fn skewness(&self) -> f64 {
+        self.standard_moment(3)
+    }
+
+    /// Kurtosis ⟨x⁴⟩/⟨x²⟩² about the mean: 3 for a Gaussian sea, 1.5 for a sine; NaN for a flat record.
+    #[must_use]
+    pub fn kurtosis(&self) -> f64 {
+        self.standard_moment(4)
+    }
+
+    fn standard_moment(&self, order: i32) -> f64 {
+        let (mean_m, deviation_m) = (self.mean_m(), self.variance_m2().sqrt());
+        self.samples_m.iter().map(|x| ((x - mean_m) / deviation_m).powi(order)).sum::<f64>() / self.samples_m.len() as f64
+    }
+
     /// The record less its mean.
     #[must_use]
     pub fn without_mean(mut self) -> Self {
@@ -142,6 +159,18 @@ mod tests {
             let error = Record::new(vec![0.0, 0.0, 0.0, bad, f64::NAN], 2.0).unwrap_err();
             assert!(matches!(error, RecordError::NotFinite { index: 3, .. }), "{error}");
         }
+    }
+
+    /// Of a sine ⟨sin⁴⟩/⟨sin²⟩² = (3/8)/(1/4); of ones and zeros with share p: (1 − 2p)/√(p(1 − p)) and 1/(p(1 − p)) − 3.
+    #[test]
+    fn shapes_have_their_moments() {
+        let sine: Vec<f64> = (0..1000).map(|i| 2.0 + 0.3 * (std::f64::consts::TAU * f64::from(i) / 50.0).sin()).collect();
+        let sine = Record::new(sine, 5.0).unwrap();
+        assert!(sine.skewness().abs() < 1e-9 && (sine.kurtosis() - 1.5).abs() < 1e-9);
+        let steps: Vec<f64> = (0..1000).map(|i| if i % 5 == 0 { 1.0 } else { 0.0 }).collect();
+        let steps = Record::new(steps, 5.0).unwrap();
+        assert!((steps.skewness() - 0.6 / 0.4).abs() < 1e-9 && (steps.kurtosis() - (1.0 / 0.16 - 3.0)).abs() < 1e-9);
+        assert!(Record::new(vec![1.0; 9], 5.0).unwrap().skewness().is_nan());
     }
 
     #[test]

@@ -127,6 +127,28 @@ impl SampledSpectrum {
         self.band(low_hz, high_hz).map(|(f, density)| f.powi(order) * density * self.df_hz).sum()
     }
 
+    /// Width ε = √(1 − m2²/(m0 m4)) (Cartwright and Longuet-Higgins 1956), 0 for one frequency; it hangs on the tail. NaN without energy.
+    #[must_use]
+    pub fn width_epsilon(&self, low_hz: f64, high_hz: f64) -> f64 {
+        let [m0, m2, m4] = [0, 2, 4].map(|order| self.moment(order, low_hz, high_hz));
+        root(1.0 - m2 * m2 / (m0 * m4))
+    }
+
+    /// Width ν = √(m0 m2/m1² − 1) (Longuet-Higgins 1975), 0 for one frequency. NaN without energy.
+    #[must_use]
+    pub fn width_nu(&self, low_hz: f64, high_hz: f64) -> f64 {
+        let [m0, m1, m2] = [0, 1, 2].map(|order| self.moment(order, low_hz, high_hz));
+        root(m0 * m2 / (m1 * m1) - 1.0)
+    }
+
+    /// Peakedness Q_p = 2/m0² ∫ f S² df (Goda 1970): 1 for white noise from 0, 2 for Pierson-Moskowitz, higher where a peak is narrow. A smoothed
+    /// spectrum has less of it. NaN without energy.
+    #[must_use]
+    pub fn peakedness(&self, low_hz: f64, high_hz: f64) -> f64 {
+        let m0 = self.moment(0, low_hz, high_hz);
+        2.0 / (m0 * m0) * self.band(low_hz, high_hz).map(|(f, density)| f * density * density * self.df_hz).sum::<f64>()
+    }
+
     /// Wave statistics of the band `low_hz`…`high_hz`; `None` where it holds no energy.
     #[must_use]
     pub fn statistics(&self, low_hz: f64, high_hz: f64) -> Option<SpectralStatistics> {
@@ -145,6 +167,11 @@ impl SampledSpectrum {
             t_e_s: m_minus1 / m0,
         })
     }
+}
+
+/// The root of what rounding may have made negative; NaN stays NaN.
+fn root(square: f64) -> f64 {
+    if square < 0.0 { 0.0 } else { square.sqrt() }
 }
 
 /// What a spectrum says about the waves.
@@ -215,6 +242,22 @@ mod tests {
         }
         let line = Welch { segment_samples: 1000, taper: Taper::Rectangle }.spectrum(&sine).unwrap();
         assert_relative_eq!(line.density_m2_per_hz()[50], 0.02 / 0.01, max_relative = 1e-9);
+    }
+
+    /// Of a flat band from a to b: Q_p = (b + a)/(b − a), and mₙ = (bⁿ⁺¹ − aⁿ⁺¹)/(n + 1).
+    #[test]
+    fn widths_of_a_flat_band_are_closed_forms() {
+        let (a, b) = (0.2_f64, 0.8_f64);
+        let df_hz = 1e-4;
+        let density = (0..10_000).map(|i| if (a..=b).contains(&(f64::from(i) * df_hz)) { 1.0 } else { 0.0 }).collect();
+        let flat = SampledSpectrum { df_hz, density_m2_per_hz: density };
+        let m = |n: i32| (b.powi(n + 1) - a.powi(n + 1)) / f64::from(n + 1);
+        assert_relative_eq!(flat.peakedness(0.0, 1.0), (b + a) / (b - a), max_relative = 1e-3);
+        assert_relative_eq!(flat.width_nu(0.0, 1.0), (m(0) * m(2) / m(1).powi(2) - 1.0).sqrt(), max_relative = 1e-3);
+        assert_relative_eq!(flat.width_epsilon(0.0, 1.0), (1.0 - m(2).powi(2) / (m(0) * m(4))).sqrt(), max_relative = 1e-3);
+        assert!(
+            flat.peakedness(0.9, 1.0).is_nan() && flat.width_nu(0.9, 1.0).is_nan() && flat.width_epsilon(0.9, 1.0).is_nan()
+        );
     }
 
     #[test]

@@ -81,13 +81,12 @@ pub(super) fn run(options: &Options, args: &Args) -> anyhow::Result<ExitCode> {
         (None, Some(first), Some(last)) => last.stamp.seconds_since(first.stamp).clamp(1.0, 86_400.0) + 1.0,
         (None, ..) => 1.0,
     };
-    if let Some(report) = &args.report {
-        let pictures = frames.iter().flat_map(|frame| [frame.left.as_path(), frame.right.as_path()]);
-        let others = [("--grid", &args.grid), ("--wass", &args.wass)];
-        let others = others.into_iter().filter_map(|(option, path)| Some((option, path.as_deref()?)));
-        let inputs = pictures.map(|path| ("DIR", path)).chain(others);
-        check_outputs(inputs, &[Output::file("--report", report, &["html", "htm"])]).map_err(bad_input)?;
-    }
+    let report = args.report.as_ref().map(|path| Output::file("--report", path, &["html", "htm"]));
+    let maps = [("--grid", &args.grid), ("--wass", &args.wass)];
+    let maps = maps.into_iter().filter_map(|(option, path)| Some(Output::plain_file(option, path.as_ref()?, &["nc", "nc4"])));
+    let pictures = frames.iter().flat_map(|frame| [frame.left.as_path(), frame.right.as_path()]);
+    let outputs: Vec<Output> = report.into_iter().chain(maps).collect();
+    check_outputs(pictures.map(|path| ("DIR", path)), &outputs).map_err(bad_input)?;
     let how = ReconstructOptions { grid: args.grid.clone(), wass: args.wass.clone(), ..args.how.options() };
     let is_fixed = frames.iter().all(|frame| frame.pose.is_none());
     let rig = halcyon_model::RigId::new("rig")?;

@@ -242,9 +242,14 @@ pub(super) fn rows(burst: &Burst) -> Vec<(String, String)> {
             add("  T_m01", with_bounds(s.t_m01_s, s.t_m01_s_low, s.t_m01_s_high, "s"));
             add("  T_m02", with_bounds(s.t_m02_s, s.t_m02_s_low, s.t_m02_s_high, "s"));
             add("  T_e", with_bounds(s.t_e_s, s.t_e_s_low, s.t_e_s_high, "s"));
+            add(
+                "  widths ε, ν; peakedness Q_p",
+                format!("{}, {}; {}", four(s.width_epsilon), four(s.width_nu), four(s.peakedness_q_p)),
+            );
             add("  m0", format!("{:.4e} m²", s.m0));
         }
     }
+    add("skewness, kurtosis", format!("{}, {}", four(burst.skewness), four(burst.kurtosis)));
     for of in &burst.crest_statistics {
         add(
             &format!("highest of {}, {}", of.of, of.theory),

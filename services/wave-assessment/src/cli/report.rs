@@ -58,6 +58,10 @@ pub struct Burst {
     pub mean_m: f64,
     /// Standard deviation about the trend, metres.
     pub deviation_m: f64,
+    /// Skewness of the elevation; null where it is flat.
+    pub skewness: f64,
+    /// Its kurtosis, 3 for a Gaussian sea.
+    pub kurtosis: f64,
     /// Waves from one rise through the trend to the next; absent where there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub zero_up: Option<ZeroCrossing>,
@@ -157,7 +161,7 @@ pub struct Band {
 with_intervals! {
     /// Statistics of a spectrum; moments in m² Hzⁿ.
     Spectrum {
-        band: Band, degrees_of_freedom: Option<f64>, f_p_hz: f64, m_minus1: f64, m0: f64, m1: f64, m2: f64, m3: f64, m4: f64,
+        band: Band, degrees_of_freedom: Option<f64>, f_p_hz: f64, width_epsilon: f64, width_nu: f64, peakedness_q_p: f64, m_minus1: f64, m0: f64, m1: f64, m2: f64, m3: f64, m4: f64,
     }
     h_m0_m, h_m0_m_low, h_m0_m_high;
     t_p_s, t_p_s_low, t_p_s_high;
@@ -177,6 +181,9 @@ impl Spectrum {
             band: Band { low_hz, high_hz },
             degrees_of_freedom: bounds.as_ref().map(|bounds| bounds.degrees_of_freedom),
             f_p_hz: found.f_p_hz,
+            width_epsilon: density.width_epsilon(low_hz, high_hz),
+            width_nu: density.width_nu(low_hz, high_hz),
+            peakedness_q_p: density.peakedness(low_hz, high_hz),
             m_minus1: moment(-1),
             m0: found.m0_m2,
             m1: moment(1),
@@ -252,6 +259,8 @@ impl Burst {
             duration_s: record.duration_s(),
             mean_m,
             deviation_m: record.variance_m2().sqrt(),
+            skewness: record.skewness(),
+            kurtosis: record.kurtosis(),
             zero_up: ZeroCrossing::of(&up),
             zero_down: ZeroCrossing::of(&waves(&record, Crossing::Down, 0.0)),
             spectrum,
