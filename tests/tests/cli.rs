@@ -85,34 +85,6 @@ fn a_rendered_survey_becomes_elevation_maps() {
     }
 }
 
-/// A calm and a rough pond, rendered: heights within their intervals, and what follows from them.
-#[test]
-fn a_survey_has_a_sea_state_and_a_verdict() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let at = |name: &str| folder.path().join(name).to_str().expect("text").to_owned();
-    for (name, sea, expected) in [("calm", "jonswap:0.04,1.5", "safe"), ("rough", "jonswap:0.5,3.0", "unsafe")] {
-        let (survey, page, maps) = (at(name), at("report.html"), at("maps.nc"));
-        let rendered = halcyon(&["sim", "render", &survey, "--seconds", "60", "--rate-hz", "5", "--sea", sea, "--seed", "5"]);
-        assert_eq!(rendered.status.code(), Some(0), "{}", String::from_utf8_lossy(&rendered.stderr));
-        let report = json(&halcyon(&["survey", &survey, "--json", "--report", &page, "--grid", &maps]));
-        let state = &report["sea_state"];
-        assert_eq!(state["patches"], 300);
-        assert_eq!(report["verdict"]["state"], expected, "{:#}", report["verdict"]);
-        assert!(report["verdict"]["reasons"].as_array().is_some_and(|reasons| reasons.len() >= 8));
-        let truth: Value =
-            serde_json::from_slice(&std::fs::read(at(&format!("{name}/truth.json"))).expect("the truth")).expect("JSON");
-        let number = |value: &Value| value.as_f64().expect("a number");
-        let within = number(&state["h_s_m_low"])..=number(&state["h_s_m_high"]);
-        assert!(within.contains(&number(&truth["h_s_m"])), "{within:?} {truth}");
-        assert!(state["centre"]["zero_up"]["h_s_m"].is_number() && state["centre"]["spectrum"]["h_m0_m"].is_number());
-        assert!(std::fs::read_to_string(&page).expect("the page").contains(expected));
-        assert!(std::fs::read(&maps).expect("the maps").starts_with(b"\x89HDF\r\n"));
-        refused(&["survey", &survey, "--report", &at("x.html"), "--grid", &at("x.html")], "--grid");
-    }
-    refused(&["survey", &at("nothing")], "rig.yaml");
-    refused(&["waves", &at("nothing.csv")], "nothing.csv");
-}
-
 #[test]
 fn a_rig_says_what_it_can_measure() {
     let folder = tempfile::tempdir().expect("a folder");
