@@ -12,6 +12,7 @@
 //! | [`confidence`] | confidence limits of variances |
 //! | [`outlier`] | readings that cannot be, replaced by their neighbour |
 //! | [`quality`] | the QARTOD tests of a record, its repair, rotor ripples |
+//! | [`crests`] | crest and height distributions, the highest wave in time and in space |
 //! | [`filter`], [`spline`] | splitting a record by frequency; uneven samples to even ones |
 //!
 //! Elevation is positive up, metres; densities are one-sided, m²/Hz.
@@ -20,6 +21,7 @@
 //! holds theory and no simulation.
 
 pub mod confidence;
+pub mod crests;
 pub mod crossing;
 pub mod dispersion;
 pub mod filter;

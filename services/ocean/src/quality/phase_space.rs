@@ -34,7 +34,7 @@ pub const ROUNDS_MAX: usize = 20;
 pub fn despike(samples_m: &[f64], variant: Variant) -> Repaired {
     const SAMPLES_MIN: usize = 8;
     // Squares of larger magnitudes overflow, as in a record.
-    let mut bad: Vec<bool> = samples_m.iter().map(|x| !(x.abs() < 1e100)).collect();
+    let mut bad: Vec<bool> = samples_m.iter().map(|x| !x.is_finite() || x.abs() > 1e100).collect();
     if bad.iter().filter(|bad| !**bad).count() < SAMPLES_MIN {
         return Repaired { samples_m: samples_m.to_vec(), changes: Vec::new() };
     }

@@ -238,7 +238,7 @@ pub fn acceleration(series: &mut Ordered, limits: &ReadingLimits) -> Finding {
         return nothing(Test::Acceleration);
     }
     let lag = (limits.acceleration_step_s / series.interval_s).round().max(1.0);
-    if before < 3 || !(lag < before as f64) {
+    if before < 3 || lag.is_nan() || lag >= before as f64 {
         return Finding::new(Test::Acceleration, Flag::NotEvaluated, "too few readings for an acceleration");
     }
     let (lag, limit_mps2) = (lag as usize, limits.acceleration_g * GRAVITY_MPS2);
