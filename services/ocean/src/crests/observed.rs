@@ -44,7 +44,7 @@ pub fn compare(values_m: &[f64], model: &impl Exceedance, from_m: f64) -> Option
     values.sort_by(|a, b| b.total_cmp(a));
     let n = values.len() as f64;
     let above = model.exceedance(from_m);
-    let theory: Vec<f64> = values.iter().map(|x| (model.exceedance(*x) / above).min(1.0)).collect();
+    let theory: Vec<f64> = values.iter().map(|x| (model.exceedance(*x) / above).clamp(0.0, 1.0)).collect();
     if theory.iter().any(|p| p.is_nan()) || above <= 0.0 {
         return None;
     }
