@@ -25,6 +25,7 @@ fn refused(arguments: &[&str], expected: &str) {
     assert_eq!(output.status.code(), Some(2), "{arguments:?}: {stderr}");
     assert!(stderr.to_lowercase().contains(&expected.to_lowercase()), "{arguments:?}: {stderr:?} should contain {expected:?}");
     assert!(!stderr.contains("panicked"), "{stderr}");
+    assert_eq!(stderr.trim_end().lines().count(), 1, "one line: {stderr}");
     assert!(output.stdout.is_empty(), "nothing on stdout");
 }
 
@@ -130,6 +131,17 @@ fn careless_use_is_refused_with_one_line() {
     refused(&[&plan[..], &["-1"]].concat(), "baseline");
     refused(&[&plan[..], &["0.1", "--altitudes", "-5..nan"]].concat(), "altitudes");
     refused(&[&plan[..], &["0.1", "--plot", "rig.pdf"]].concat(), ".svg or .html");
+    refused(&[&plan[..], &["0.1", "--wave-height", "1000"]].concat(), "--wave-height must be 0.0001 to 40 m, not 1000 m");
+    refused(&[&plan[..], &["0.1", "--wave-height", "2", "--wavelength", "10"]].concat(), "breaks");
+    refused(
+        &calibrate("samples/left??.jpg", "samples/right??.jpg", &["--board", "9x6", "--square", "25"]),
+        "25 mm are 0.025 m",
+    );
+    refused(&calibrate("samples/left01.jpg", "samples/left02.jpg", &["samples/left03.jpg"]), "quotes");
+    refused(
+        &[&calibrate("samples/left??.jpg", "samples/right??.jpg", &BOARD)[..], &["--distance", "nan"]].concat(),
+        "--distance",
+    );
     refused(&["up", "--sea", "lumpy"], "sea");
     refused(&["up", "--sea", "jonswap:nan,1"], "height");
     refused(&["up", "--speed", "0"], "speed");
@@ -139,6 +151,58 @@ fn careless_use_is_refused_with_one_line() {
     refused(&["run", "captain"], "there is no service");
     refused(&["mission", "--url", "not a url", "list"], "url");
     refused(&["frobnicate"], "unrecognized");
+}
+
+/// Whatever stands under the name of an output, no input is lost, and what cannot be written is said before the work.
+#[test]
+fn outputs_that_would_cost_something_are_refused_at_once() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name).to_str().expect("text").to_owned();
+    for (name, sample) in [("left.png", "aloeL.jpg"), ("right.png", "aloeR.jpg"), ("left.yaml", "left01.jpg")] {
+        std::fs::copy(root().join("samples").join(sample), at(name)).expect("a copy");
+    }
+    std::os::unix::fs::symlink(at("left.png"), at("link.png")).expect("a link");
+    let before = std::fs::read(at("left.png")).expect("a picture");
+    let (left, right, link, yaml) = (at("left.png"), at("right.png"), at("link.png"), at("left.yaml"));
+    let nowhere = at("nowhere/x.png");
+    let pair = ["--left", &left, "--right", &right];
+    let run = |command: &[&str], rest: &[&str], expected: &str| refused(&[command, &pair, rest].concat(), expected);
+    for out in [&left, &link] {
+        run(&["match", "--max-disparity", "64"], &["--out", out], "would overwrite an input, that of --left");
+        run(&["features"], &["--out", out], "would overwrite an input, that of --left");
+    }
+    run(&["match", "--max-disparity", "64"], &["--out", &nowhere], "--out");
+    run(&["features"], &["--out", &nowhere], "there is no folder");
+    run(&["reconstruct", "--rig", &yaml], &["--disparity", &right], "would overwrite an input, that of --right");
+    run(&["reconstruct", "--rig", &yaml], &["--grid", &at("x.nc"), "--wass", &at("x.nc")], "the same file");
+    run(&["self-calibrate", "--rig", &yaml], &["--out", &yaml], "would overwrite an input, that of --rig");
+    refused(&[&calibrate(&yaml, &right, &BOARD)[..], &["--out", &yaml]].concat(), "would overwrite an input, that of --left");
+    refused(&[&calibrate(&left, &right, &BOARD)[..], &["--report", &at("r.pdf")]].concat(), ".html");
+    refused(&["rig", "--rig", &at("left.yaml"), "--plot", &at("nowhere/x.svg")], "--plot");
+    assert_eq!(std::fs::read(at("left.png")).expect("a picture"), before);
+    assert!(std::fs::symlink_metadata(&link).expect("the link").is_symlink());
+    assert_eq!(std::fs::read_dir(folder.path()).expect("the folder").count(), 4, "nothing is left behind");
+}
+
+#[test]
+fn a_blank_pair_has_no_texture_and_a_cloud_that_is_missing_is_a_failure() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name).to_str().expect("text").to_owned();
+    std::fs::write(at("black.pgm"), [b"P5 640 480 255\n".as_slice(), &[0; 640 * 480]].concat()).expect("a picture");
+    let (black, rig) = (at("black.pgm"), at("rig.yaml"));
+    let pair = ["--left", &black, "--right", &black];
+    let output = halcyon(&[&["match", "--max-disparity", "64", "--out", &at("d.pfm"), "--json"][..], &pair].concat());
+    let report = json(&output);
+    assert_eq!((&report["density"], &report["points"]), (&0.0.into(), &0.into()));
+    assert!(String::from_utf8_lossy(&output.stderr).starts_with("warning: no texture in "));
+    let board = [&BOARD[..], &["--out", &rig, "--json"]].concat();
+    json(&halcyon(&calibrate("samples/left??.jpg", "samples/right??.jpg", &board)));
+    let cloud = at("c.ply");
+    let output = halcyon(&[&["features", "--rig", &rig, "--cloud", &cloud, "--json"][..], &pair].concat());
+    assert_eq!(output.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("c.ply is not written"));
+    assert!(!std::path::Path::new(&cloud).exists());
+    refused(&[&["reconstruct", "--rig", &rig][..], &pair].concat(), "no texture in");
 }
 
 #[test]

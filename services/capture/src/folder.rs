@@ -174,7 +174,12 @@ impl SurveyFolder {
 
 fn read_text(path: &Path, bytes_max: u64) -> Result<String, FolderError> {
     let file = |problem| FolderError::File { path: path.to_owned(), problem };
-    let bytes = std::fs::metadata(path).map_err(|error| file(error.to_string()))?.len();
+    let data = std::fs::metadata(path).map_err(|error| file(error.to_string()))?;
+    // Opening a pipe that nobody writes to never ends.
+    if !data.is_file() {
+        return Err(file("it is a folder, a device or a pipe, not a file".into()));
+    }
+    let bytes = data.len();
     if bytes > bytes_max {
         return Err(file(format!("{bytes} bytes are more than the {bytes_max} that it may have")));
     }

@@ -97,7 +97,10 @@ fn every_defect_is_named_with_its_file_and_line() {
         fs::write(folder.join(file), text.replacen(from, to, 1)).unwrap();
     };
     assert_eq!(broken(|f| fs::remove_file(f.join("rig.yaml")).unwrap()), "rig.yaml: No such file or directory (os error 2)");
-    assert_eq!(broken(|f| edit(f, "rig.yaml", "D2:", "D3:")), "rig.yaml: D2 is missing");
+    assert_eq!(
+        broken(|f| edit(f, "rig.yaml", "D2:", "D3:")),
+        "rig.yaml: D2 is missing, and so are distCoeffs2, dist_coeffs_2, dist_coeffs2, distortion2, D_right"
+    );
     assert_eq!(
         broken(|f| edit(f, "frames.csv", "000001,", "000001,x")),
         "frames.csv: line 3: stamp_s is \"x1750000000.250000000\", expected seconds since 1970, 0 to 9e9"

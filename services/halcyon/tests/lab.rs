@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use halcyon::accuracy::Extent;
-use halcyon::lab::{Exhibit, Experiment, Lab, LabError, page, select, write};
+use halcyon::lab::{Exhibit, Experiment, Lab, LabError, Part, page, read_parts, select, write};
 
 fn lab() -> Lab {
     Lab::new(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../samples"), Extent::Quick)
@@ -78,11 +78,12 @@ fn clear_water_shows_nothing_and_a_film_does() {
 
 #[test]
 fn a_report_stands_alone() {
-    let exhibits = [run("rectification"), run("film")];
     let folder = tempfile::tempdir().unwrap();
-    write(folder.path(), &exhibits).unwrap();
+    for (experiment, exhibit) in [run("rectification"), run("film")] {
+        write(folder.path(), &Part::new(experiment, &exhibit, "quick run"), &exhibit).unwrap();
+    }
     let html = std::fs::read_to_string(folder.path().join("index.html")).unwrap();
-    assert!(html == page(&exhibits) && html.contains("<svg") && html.contains("data:image/png;base64,"));
+    assert!(html == page(&read_parts(folder.path())) && html.contains("<svg") && html.contains("data:image/jpeg;base64,"));
     assert!(
         !html.contains("http://") || html.matches("http://").count() == html.matches("http://www.w3.org").count(),
         "nothing is loaded"

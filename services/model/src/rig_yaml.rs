@@ -3,15 +3,16 @@
 //! The format is OpenCV's `FileStorage` YAML, so that OpenCV's own programs and ours read each other's files. It holds
 //! `image_size` (width, height), `M1` and `M2` (3 × 3 camera matrices), `D1` and `D2` (k1, k2, p1, p2\[, k3\]), `R` (3 × 3) and `T` (metres) of
 //! X2 = R X1 + T, and optionally `body_from_camera` (3 × 3, default [`RigCalibration::LOOKING_DOWN`]) and `camera_in_body_m` (metres,
-//! default zero). Other keys are left alone: calibration programs add theirs. This reads the subset of YAML that
-//! `FileStorage` writes, and nothing of the disk: text in, text out.
+//! default zero). Names that other programs give the same things (`cameraMatrix1`, `K1`, `distCoeffs1`, `imageSize` …) are understood;
+//! other keys are left alone: calibration programs add theirs. This reads the subset of YAML that `FileStorage` writes, and nothing
+//! of the disk: text in, text out.
 
 use std::fmt::Write as _;
 
 use nalgebra::{Matrix3, Vector3};
 
 use crate::stereo::RigCalibration;
-use crate::yaml::Document;
+use crate::yaml::{Document, also_looked_for};
 
 /// Texts longer than this are not a rig's calibration; bounds what a hostile file can cost.
 pub const TEXT_BYTES_MAX: usize = 1 << 20;
@@ -42,7 +43,7 @@ pub enum RigYamlError {
         key: String,
     },
     /// A key that must be there.
-    #[error("{key} is missing")]
+    #[error("{key} is missing{}", also_looked_for(key))]
     Missing {
         /// Which.
         key: &'static str,
@@ -176,13 +177,40 @@ mod tests {
     }
 
     #[test]
+    fn other_programs_names_are_understood() {
+        let rig = parse(TEXT).unwrap();
+        let renamed = |pairs: &[(&str, &str)]| {
+            pairs.iter().fold(TEXT.to_owned(), |text, (from, to)| {
+                assert!(text.contains(from), "{from}");
+                text.replace(from, to)
+            })
+        };
+        let opencv = [("M1:", "cameraMatrix1:"), ("D1:", "distCoeffs1:"), ("M2:", "cameraMatrix2:"), ("D2:", "distCoeffs2:")];
+        assert_eq!(parse(&renamed(&opencv)), Ok(rig));
+        assert_eq!(parse(&renamed(&[("M1:", "K1:"), ("M2:", "K2:"), ("image_size:", "imageSize:")])), Ok(rig));
+        let sides = [("image_size: [ 640, 480 ]", "image_width: 640\nimage_height: 480")];
+        assert_eq!(parse(&renamed(&sides)), Ok(rig));
+        // Ours come first, and a matrix that is missing is named with all that was looked for.
+        let both = format!("{TEXT}K1: [ 1, 2 ]\n");
+        assert_eq!(parse(&both), Ok(rig));
+        let error = parse(&renamed(&[("M2:", "Kright:")])).unwrap_err().to_string();
+        assert!(error.starts_with("M2 is missing, and so are cameraMatrix2, ") && error.contains("K2"), "{error}");
+        let one_side = renamed(&[("image_size: [ 640, 480 ]", "image_width: 640")]);
+        assert!(parse(&one_side).unwrap_err().to_string().starts_with("image_size is missing"));
+    }
+
+    #[test]
     fn every_defect_is_named() {
         #[track_caller]
         fn check(from: &str, to: &str, expected: &str) {
             assert!(TEXT.contains(from), "{from}");
             assert_eq!(parse(&TEXT.replacen(from, to, 1)).unwrap_err().to_string(), expected);
         }
-        check("image_size: [ 640, 480 ]  # px\n", "", "image_size is missing");
+        check(
+            "image_size: [ 640, 480 ]  # px\n",
+            "",
+            "image_size is missing, and so are imageSize, ImageSize, img_size, image_width with image_height",
+        );
         check("[ 640, 480 ]", "[ 640, 480.5 ]", "line 4: image_size must be two whole numbers of 1 to 16384 pixels");
         check("[ 640, 480 ]", "[ 640 ]", "line 4: image_size is 1 x 1, expected 2 numbers: width, height");
         check("5.0e+02, 0., 3.2e+02", ".Nan, 0., 3.2e+02", "line 5: M1 has \".Nan\", expected a finite number");

@@ -10,6 +10,34 @@ use crate::stereo::{CameraIntrinsics, Image};
 /// How far from orthonormal a rotation may be: files with six digits pass, a transposed or scaled matrix doesn't.
 const ROTATION_TOLERANCE: f64 = 1e-4;
 
+/// What other programs call a rig's keys, ours first: OpenCV's own samples and tutorials, and what people make of them.
+const NAMES: [&[&str]; 7] = [
+    &["image_size", "imageSize", "ImageSize", "img_size"],
+    &["M1", "cameraMatrix1", "camera_matrix_1", "camera_matrix1", "K1", "M_left"],
+    &["D1", "distCoeffs1", "dist_coeffs_1", "dist_coeffs1", "distortion1", "D_left"],
+    &["M2", "cameraMatrix2", "camera_matrix_2", "camera_matrix2", "K2", "M_right"],
+    &["D2", "distCoeffs2", "dist_coeffs_2", "dist_coeffs2", "distortion2", "D_right"],
+    &["R", "rotation", "rotation_matrix"],
+    &["T", "translation", "translation_vector"],
+];
+/// A size may also be two keys.
+const SIDES: [[&str; 2]; 2] = [["image_width", "image_height"], ["imageWidth", "imageHeight"]];
+
+/// The names that a key goes by, in the order of preference.
+fn names(key: &'static str) -> impl Iterator<Item = &'static str> {
+    let own = NAMES.into_iter().find(|names| names[0] == key).unwrap_or_default();
+    std::iter::once(key).chain(own.iter().copied().skip(1))
+}
+
+/// For a message about a key that is missing: what else was looked for.
+pub(crate) fn also_looked_for(key: &'static str) -> String {
+    let mut others: Vec<&str> = names(key).skip(1).collect();
+    if key == "image_size" {
+        others.push("image_width with image_height");
+    }
+    if others.is_empty() { String::new() } else { format!(", and so are {}", others.join(", ")) }
+}
+
 /// The top-level entries, not yet read.
 pub(crate) struct Document<'a> {
     entries: BTreeMap<&'a str, Entry<'a>>,
@@ -50,7 +78,7 @@ impl<'a> Document<'a> {
     }
 
     pub(crate) fn optional(&self, key: &'static str) -> Result<Option<List>, RigYamlError> {
-        self.entries.get(key).map(|entry| entry.list(key)).transpose()
+        names(key).find_map(|name| self.entries.get(name)).map(|entry| entry.list(key)).transpose()
     }
 
     pub(crate) fn required(&self, key: &'static str) -> Result<List, RigYamlError> {
@@ -69,10 +97,22 @@ impl<'a> Document<'a> {
     }
 
     pub(crate) fn image_size(&self) -> Result<(u32, u32), RigYamlError> {
-        let size = self.required("image_size")?;
+        let Some(size) = self.optional("image_size")? else { return self.sides() };
         let [width, height] = size.values[..] else { return Err(size.shape("2 numbers: width, height")) };
         let sides = side_px(width).zip(side_px(height));
         sides.ok_or_else(|| size.value("must be two whole numbers of 1 to 16384 pixels"))
+    }
+
+    /// A size as two keys.
+    fn sides(&self) -> Result<(u32, u32), RigYamlError> {
+        for [width, height] in SIDES {
+            if let (Some(width), Some(height)) = (self.optional(width)?, self.optional(height)?) {
+                let side =
+                    |list: &List| list.side_px().ok_or_else(|| list.value("must be a whole number of 1 to 16384 pixels"));
+                return Ok((side(&width)?, side(&height)?));
+            }
+        }
+        Err(RigYamlError::Missing { key: "image_size" })
     }
 
     pub(crate) fn camera(

@@ -8,7 +8,9 @@
 //! | [`record`] | an evenly sampled record, checked |
 //! | [`crossing`] | zero-crossing analysis: waves, H_m, H_s, H_1/10, H_max, T_z, T_1/3 |
 //! | [`welch`] | Welch's spectrum, H_m0, T_p, T_m01, T_m02, T_e |
+//! | [`crests`] | distributions of crests and heights, the highest of many, observations against them |
 //! | [`height`] | Rayleigh heights, the expected highest wave |
+//! | [`interval`] | 95 % intervals of wave statistics: bootstrap by groups, spectra |
 //! | [`confidence`] | confidence limits of variances |
 //! | [`outlier`] | readings that cannot be, replaced by their neighbour |
 //! | [`quality`] | the QARTOD tests of a record, its repair, rotor ripples |
@@ -26,6 +28,7 @@ pub mod crossing;
 pub mod dispersion;
 pub mod filter;
 pub mod height;
+pub mod interval;
 pub mod outlier;
 pub mod quality;
 pub mod record;
@@ -41,4 +44,4 @@ pub use record::{Record, RecordError};
 pub use spectrum::{Jonswap, PiersonMoskowitz, Spectrum, SpectrumError};
 pub use spline::Spline;
 pub use spreading::CosTwoS;
-pub use welch::{SampledSpectrum, SpectralStatistics, Welch};
+pub use welch::{SampledSpectrum, SpectralStatistics, Taper, Welch};

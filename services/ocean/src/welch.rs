@@ -7,17 +7,48 @@ use crate::record::{Record, RecordError, mean};
 /// How a spectrum is estimated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Welch {
-    /// Samples in a segment; segments overlap by half, under a Hann window, each less its mean.
+    /// Samples in a segment; segments overlap by half, each less its mean.
     pub segment_samples: usize,
+    /// What each is multiplied by.
+    pub taper: Taper,
+}
+
+/// A window that brings a segment's ends to nothing, or nearly. All are periodic: half-overlapped copies of the first two add up evenly.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Taper {
+    /// Hann's: leaks least far from a peak.
+    #[default]
+    Hann,
+    /// Hamming's, which many packages have by default.
+    Hamming,
+    /// None: of a whole record it is the periodogram of the thesis (figure 5-30).
+    Rectangle,
+}
+
+impl Taper {
+    fn at(self, share: f64) -> f64 {
+        let cos = (std::f64::consts::TAU * share).cos();
+        match self {
+            Self::Hann => 0.5 - 0.5 * cos,
+            Self::Hamming => 0.54 - 0.46 * cos,
+            Self::Rectangle => 1.0,
+        }
+    }
 }
 
 impl Welch {
+    /// Segments of so many samples under Hann's window.
+    #[must_use]
+    pub fn new(segment_samples: usize) -> Self {
+        Self { segment_samples, taper: Taper::default() }
+    }
+
     /// Segments of about `segment_s` seconds at the record's rate: the resolution is about 1.5/`segment_s`, and the more segments, the
     /// steadier the estimate.
     #[must_use]
     pub fn with_segments_of_s(segment_s: f64, record: &Record) -> Self {
         let samples = (segment_s * record.rate_hz()).round();
-        Self { segment_samples: (samples.max(0.0) as usize).clamp(Record::SAMPLES_MIN, record.samples_m().len()) }
+        Self::new((samples.max(0.0) as usize).clamp(Record::SAMPLES_MIN, record.samples_m().len()))
     }
 
     /// The spectrum of `record`. Samples that no longer fill a segment at the end are left out.
@@ -30,8 +61,7 @@ impl Welch {
         if n < Record::SAMPLES_MIN || samples.len() < n {
             return Err(RecordError::TooShort { samples: samples.len(), samples_min: n.max(Record::SAMPLES_MIN) });
         }
-        // The periodic Hann window, whose half-overlapped copies add up to one.
-        let window: Vec<f64> = (0..n).map(|i| 0.5 - 0.5 * (std::f64::consts::TAU * i as f64 / n as f64).cos()).collect();
+        let window: Vec<f64> = (0..n).map(|i| self.taper.at(i as f64 / n as f64)).collect();
         let window_power: f64 = window.iter().map(|w| w * w).sum();
         let fft = RealFftPlanner::<f64>::new().plan_fft_forward(n);
         let (mut input, mut output, mut scratch) = (fft.make_input_vec(), fft.make_output_vec(), fft.make_scratch_vec());
@@ -153,7 +183,7 @@ mod tests {
     fn a_sine_has_its_height_and_period() {
         let sine = record(4096, 4.0, |i| 7.0 + 0.5 * (TAU * 0.125 * i as f64 / 4.0).sin());
         for segment_samples in [512, 1024, 4096] {
-            let found = Welch { segment_samples }.spectrum(&sine).unwrap().statistics(0.0, 2.0).unwrap();
+            let found = Welch::new(segment_samples).spectrum(&sine).unwrap().statistics(0.0, 2.0).unwrap();
             assert_relative_eq!(found.h_m0_m, 4.0 * 0.5 / 2f64.sqrt(), max_relative = 1e-9);
             assert_relative_eq!(found.t_p_s, 8.0, max_relative = 1e-12);
             assert_relative_eq!(found.t_m01_s, 8.0, max_relative = 1e-3);
@@ -167,18 +197,32 @@ mod tests {
         let mut random = ChaCha8Rng::seed_from_u64(3);
         let noise = record(200_000, 10.0, |_| random.sample(rand_distr::StandardNormal));
         for segment_samples in [255, 256] {
-            let spectrum = Welch { segment_samples }.spectrum(&noise).unwrap();
+            let spectrum = Welch::new(segment_samples).spectrum(&noise).unwrap();
             assert_relative_eq!(spectrum.moment(0, 0.0, 5.0), 1.0, max_relative = 0.02);
             assert_relative_eq!(spectrum.moment(0, 1.0, 2.0), 0.2, max_relative = 0.03);
         }
     }
 
+    /// Without a taper the periodogram of a whole number of periods is one line: a²/2 over df.
+    #[test]
+    fn tapers_keep_a_sines_variance() {
+        let sine = record(1000, 10.0, |i| 0.2 * (TAU * 0.5 * i as f64 / 10.0).sin());
+        for taper in [Taper::Hann, Taper::Hamming, Taper::Rectangle] {
+            for segment_samples in [200, 1000] {
+                let spectrum = Welch { segment_samples, taper }.spectrum(&sine).unwrap();
+                assert_relative_eq!(spectrum.moment(0, 0.0, 5.0), 0.02, max_relative = 1e-9);
+            }
+        }
+        let line = Welch { segment_samples: 1000, taper: Taper::Rectangle }.spectrum(&sine).unwrap();
+        assert_relative_eq!(line.density_m2_per_hz()[50], 0.02 / 0.01, max_relative = 1e-9);
+    }
+
     #[test]
     fn still_and_short_records() {
         let still = record(100, 2.0, |_| 3.0);
-        assert_eq!(Welch { segment_samples: 50 }.spectrum(&still).unwrap().statistics(0.0, 1.0), None);
-        assert!(matches!(Welch { segment_samples: 101 }.spectrum(&still), Err(RecordError::TooShort { .. })));
-        assert!(matches!(Welch { segment_samples: 0 }.spectrum(&still), Err(RecordError::TooShort { .. })));
+        assert_eq!(Welch::new(50).spectrum(&still).unwrap().statistics(0.0, 1.0), None);
+        assert!(matches!(Welch::new(101).spectrum(&still), Err(RecordError::TooShort { .. })));
+        assert!(matches!(Welch::new(0).spectrum(&still), Err(RecordError::TooShort { .. })));
         assert_eq!(Welch::with_segments_of_s(1e9, &still).segment_samples, 100);
         assert_eq!(Welch::with_segments_of_s(f64::NAN, &still).segment_samples, 4);
     }

@@ -17,6 +17,7 @@ mod decode;
 mod glob;
 mod grey;
 pub mod netcdf;
+mod outputs;
 pub mod ply;
 mod pnm;
 mod rig;
@@ -26,7 +27,8 @@ pub use container::PictureKind;
 use container::Trouble;
 pub use glob::{GlobError, glob};
 pub use grey::{Grey, Samples};
-pub use rig::{RigFileError, read_rig, write_rig, write_ros};
+pub use outputs::{Output, OutputError, check_outputs, has_ending};
+pub use rig::{ImpossibleRig, RigFileError, check_rig, read_rig, rig_files, write_rig, write_ros};
 pub use truth::read_truth;
 
 /// Larger files are no pictures of a stereo rig.
@@ -59,8 +61,8 @@ pub enum FileError {
         /// The file.
         path: PathBuf,
     },
-    /// A device; reading it may never end.
-    #[error("{} is a device, not a file", path.display())]
+    /// A device, a pipe or a socket; reading it may never end.
+    #[error("{} is a device or a pipe, not a file", path.display())]
     Device {
         /// The file.
         path: PathBuf,
@@ -113,14 +115,9 @@ pub enum FileError {
         #[source]
         source: ImageError,
     },
-    /// The name of an output says no format that we write.
-    #[error("{}: the name must end in {expected}", path.display())]
-    Extension {
-        /// The file.
-        path: PathBuf,
-        /// What it may end in.
-        expected: &'static str,
-    },
+    /// An output that must not be written, found out before the work.
+    #[error(transparent)]
+    Output(OutputError),
 }
 
 /// Reads a picture as 8-bit grey. EXIF orientation is not applied: a calibration belongs to the sensor's own rows and columns.
@@ -166,7 +163,8 @@ pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>, FileError> {
     if kind.is_dir() {
         return Err(read(std::io::Error::from(std::io::ErrorKind::IsADirectory)));
     }
-    if is_device(kind) {
+    // Asked before it is opened: opening a pipe that nobody writes to never ends.
+    if !kind.is_file() {
         return Err(FileError::Device { path: path.into() });
     }
     let mut bytes = Vec::new();
@@ -176,17 +174,6 @@ pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>, FileError> {
         length if length > FILE_BYTES_MAX => Err(FileError::TooLarge { path: path.into() }),
         _ => Ok(bytes),
     }
-}
-
-#[cfg(unix)]
-fn is_device(kind: std::fs::FileType) -> bool {
-    use std::os::unix::fs::FileTypeExt as _;
-    kind.is_char_device() || kind.is_block_device()
-}
-
-#[cfg(not(unix))]
-fn is_device(_: std::fs::FileType) -> bool {
-    false
 }
 
 /// Writes a result as a whole: under a temporary name beside it first, so that neither a full disk nor a crash leaves half a result

@@ -11,11 +11,13 @@ mod support;
 
 use std::path::Path;
 
+use halcyon_model::{CameraIntrinsics, RigCalibration};
 use halcyon_reconstruction::cli::{self, CalibrateCliError, CalibrateRequest, MatchCliError, MatchOptions};
 use halcyon_reconstruction::core::calibrate::{CalibrateError, Options};
 use halcyon_reconstruction::core::disparity::{Disparity, pfm};
 use halcyon_reconstruction::core::matcher::{Engine, StudyMethod};
-use halcyon_reconstruction::files::{FileError, RigFileError, read_picture, read_rig};
+use halcyon_reconstruction::files::{self, FileError, OutputError, RigFileError, read_picture, read_rig};
+use nalgebra::{Matrix3, Vector3};
 use support::samples;
 
 fn sample_glob(side: &str) -> String {
@@ -130,7 +132,7 @@ fn bad_input_to_calibrate_is_named() {
     assert!(matches!(no_board, Err(CalibrateCliError::Calibrate(CalibrateError::NoBoard { pictures: 2, .. }))), "{no_board:?}");
     for square_m in [f64::NAN, 0.0, -1.0, f64::INFINITY] {
         let refused = cli::calibrate(&CalibrateRequest { square_m, ..request(&left, &right, "9x6", None) }, &mut |_, _| {});
-        assert!(matches!(refused, Err(CalibrateCliError::Calibrate(CalibrateError::Board { .. }))), "{square_m}");
+        assert!(matches!(refused, Err(CalibrateCliError::Range(_))), "{square_m}");
     }
     let with_itself = calibrate(&left, &left, "9x6", None);
     assert!(
@@ -142,7 +144,79 @@ fn bad_input_to_calibrate_is_named() {
     let text = calibrate(text.to_str().unwrap(), &first("right"), "9x6", None);
     assert!(matches!(text, Err(CalibrateCliError::File(FileError::NotAPicture { .. }))), "{text:?}");
     let nowhere_to_write = calibrate(&few("left"), &few("right"), "9x6", Some(Path::new("/nowhere/rig.yaml")));
-    assert!(matches!(nowhere_to_write, Err(CalibrateCliError::File(FileError::Write { .. }))));
+    assert!(matches!(nowhere_to_write, Err(CalibrateCliError::File(FileError::Output(OutputError::NoFolder { .. })))));
+    // What is wrong with a number or an output is said before a picture is read: none of these has a board.
+    let options = Options { depth_at_m: f64::NAN, ..Options::default() };
+    let refused = cli::calibrate(&CalibrateRequest { options, ..request(&blank, &blank, "9x6", None) }, &mut |_, _| {});
+    assert!(refused.unwrap_err().to_string().starts_with("--distance must be 0.001 to 10000 m, not NaN"));
+    let refused = calibrate(&blank, &blank, "9x6", Some(Path::new("rig.txt"))).unwrap_err().to_string();
+    assert_eq!(refused, "--out rig.txt: the name must end in .yaml or .yml");
+    let yaml = folder.path().join("left.yaml");
+    std::fs::copy(&blank, &yaml).unwrap();
+    let refused = calibrate(yaml.to_str().unwrap(), &blank, "9x6", Some(&yaml)).unwrap_err().to_string();
+    assert!(refused.contains("overwrite an input, that of --left"), "{refused}");
+    let report = folder.path().join("report.html");
+    let ask = request(&blank, &blank, "9x6", None);
+    assert!(ask.check(Some(&report)).is_ok());
+    assert!(ask.check(Some(&folder.path().join("report.pdf"))).unwrap_err().to_string().contains("--report"));
+}
+
+#[test]
+fn converting_a_rig_never_overwrites_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let rig = calibrated_rig();
+    files::write_rig(&at("rig.yaml"), &rig).unwrap();
+    cli::convert_rig(&at("rig.yaml"), Some(&at("copy.yaml")), Some(&at("ros"))).unwrap();
+    assert_eq!(files::read_rig(&at("copy.yaml")).unwrap(), rig);
+    for (from, out, ros) in
+        [("rig.yaml", Some("rig.yaml"), None), ("ros", None, Some("ros")), ("ros", Some("ros/left.yaml"), None)]
+    {
+        let before = std::fs::read(at("ros/left.yaml")).unwrap();
+        let (out, ros) = (out.map(at), ros.map(at));
+        let refused = cli::convert_rig(&at(from), out.as_deref(), ros.as_deref()).unwrap_err().to_string();
+        assert!(refused.contains("overwrite an input, that of --from"), "{refused}");
+        assert_eq!(std::fs::read(at("ros/left.yaml")).unwrap(), before);
+    }
+}
+
+fn calibrated_rig() -> RigCalibration {
+    let camera = CameraIntrinsics { fx_px: 509.0, fy_px: 509.0, cx_px: 319.5, cy_px: 239.5, distortion: [0.0; 5] };
+    RigCalibration {
+        width_px: 640,
+        height_px: 480,
+        left: camera,
+        right: camera,
+        right_from_left: Matrix3::identity(),
+        right_from_left_m: Vector3::new(-0.092, 0.0, 0.0),
+        body_from_camera: RigCalibration::LOOKING_DOWN,
+        camera_in_body_m: Vector3::zeros(),
+    }
+}
+
+#[test]
+fn a_rig_of_impossible_numbers_is_refused_with_the_unit() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("rig.yaml");
+    let mut rig = calibrated_rig();
+    rig.left.fx_px = 1e308;
+    files::write_rig(&path, &rig).unwrap();
+    let refused = files::read_rig(&path).unwrap_err();
+    assert!(matches!(refused, RigFileError::Impossible { .. }));
+    assert!(std::error::Error::source(&refused).unwrap().to_string().contains("fx must be 32 to 64000 px"));
+}
+
+/// Opening a pipe that nobody writes to never returns.
+#[cfg(unix)]
+#[test]
+fn a_named_pipe_is_refused_and_not_waited_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let pipe = folder.path().join("left.png");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    assert!(matches!(read_picture(&pipe), Err(FileError::Device { .. })));
+    let text = read_picture(&pipe).unwrap_err().to_string();
+    assert!(text.contains("a device or a pipe, not a file"), "{text}");
+    assert!(matches!(files::read_rig(&pipe), Err(RigFileError::File(FileError::Device { .. }))));
 }
 
 #[test]
@@ -201,6 +275,41 @@ fn match_finds_a_known_shift_with_every_engine_and_both_formats() {
     assert_eq!(read_picture(&png).map(|image| (image.width_px(), image.height_px())).unwrap(), (320, 120));
 }
 
+/// OpenCV searches multiples of 16 disparities: with at most 17 px it looks up to 31, and would find the shift of 20 px.
+#[test]
+fn what_lies_beyond_the_range_is_no_match() {
+    let folder = tempfile::tempdir().unwrap();
+    let (left, right) = shifted_pair(folder.path(), 20);
+    let out = folder.path().join("d.pfm");
+    for (engine, is_opencv) in [("bm", true), ("sgbm", true), ("sgbm-3way", true), ("sgm", false), ("guided", false)] {
+        let run = |max| cli::match_pair(left.as_ref(), right.as_ref(), max, engine, &MatchOptions::default(), &out).unwrap();
+        let report = run(17.0);
+        let map = pfm::decode(&std::fs::read(&out).unwrap()).unwrap();
+        assert!(map.values_px.iter().all(|value| value.is_nan() || *value <= 17.0), "{engine}");
+        assert!((map.density() - report.density).abs() < 1e-12, "{engine}: what is dropped is not counted");
+        assert!(run(21.0).density > 0.6, "{engine}");
+        // Ours never look beyond; what they take for matches within is another matter.
+        assert!(!is_opencv || report.density < 0.2, "{engine} {}", report.density);
+    }
+}
+
+#[test]
+fn blank_pictures_have_no_matches() {
+    let folder = tempfile::tempdir().unwrap();
+    let (left, _) = shifted_pair(folder.path(), 20);
+    let out = folder.path().join("d.pfm");
+    let black = write_pgm(folder.path(), "black.pgm", 320, 120, &vec![0; 320 * 120]);
+    for (left, right) in [(&black, &black), (&left, &black), (&black, &left)] {
+        for engine in Engine::ALL {
+            let report =
+                cli::match_pair(left.as_ref(), right.as_ref(), 32.0, engine.name(), &MatchOptions::default(), &out).unwrap();
+            assert_eq!((report.points, report.density), (0, 0.0), "{}", engine.name());
+            assert!(report.warnings[0].starts_with("no texture in ") && report.warnings[0].contains("black.pgm"));
+            assert_eq!(pfm::decode(&std::fs::read(&out).unwrap()).unwrap().matched(), 0);
+        }
+    }
+}
+
 #[test]
 fn bad_input_to_match_is_named() {
     let folder = tempfile::tempdir().unwrap();
@@ -211,20 +320,31 @@ fn bad_input_to_match_is_named() {
         cli::match_pair(left.as_ref(), right.as_ref(), max, engine, &MatchOptions::default(), out)
     };
 
-    for max in [0.0, -16.0, f64::NAN, f64::INFINITY, 320.0, 1e12] {
-        let refused = run(&left, &right, max, "sgbm", &out);
-        assert!(matches!(refused, Err(MatchCliError::MaxDisparity { width_px: 320, .. })), "{max}: {refused:?}");
+    for max in [0.0, -16.0, f64::NAN, f64::INFINITY, 1e12] {
+        let refused = run("/nowhere.png", &right, max, "sgbm", &out);
+        assert!(matches!(refused, Err(MatchCliError::Range(_))), "{max}: before a picture is read: {refused:?}");
+    }
+    let refused = run(&left, &right, 320.0, "sgbm", &out);
+    assert!(matches!(refused, Err(MatchCliError::MaxDisparity { width_px: 320, .. })), "{refused:?}");
+    for output in [&left, &right] {
+        let before = std::fs::read(output).unwrap();
+        let link = folder.path().join("link.pfm");
+        std::fs::hard_link(output, &link).unwrap();
+        let refused = run(&left, &right, 32.0, "bm", &link).unwrap_err().to_string();
+        assert!(refused.contains("overwrite an input"), "{refused}");
+        std::fs::remove_file(&link).unwrap();
+        assert_eq!(std::fs::read(output).unwrap(), before);
     }
     assert!(matches!(run(&left, &right, 32.0, "elas", &out), Err(MatchCliError::Engine(_))));
     assert!(matches!(run(&left, &small, 32.0, "bm", &out), Err(MatchCliError::Match(_))));
     assert!(matches!(run(&small, &small, 3.0, "sgbm", &out), Err(MatchCliError::Match(_))));
     assert!(matches!(
         run(&left, &right, 32.0, "bm", Path::new("/nowhere/d.pfm")),
-        Err(MatchCliError::File(FileError::Write { .. }))
+        Err(MatchCliError::File(FileError::Output(OutputError::NoFolder { .. })))
     ));
     assert!(matches!(
         run(&left, &right, 32.0, "bm", Path::new("d.tiff")),
-        Err(MatchCliError::File(FileError::Extension { .. }))
+        Err(MatchCliError::File(FileError::Output(OutputError::Ending { .. })))
     ));
     assert!(matches!(run(&left, "/nowhere.jpg", 32.0, "bm", &out), Err(MatchCliError::File(FileError::Read { .. }))));
     assert!(matches!(

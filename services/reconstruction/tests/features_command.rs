@@ -17,7 +17,7 @@ use halcyon_reconstruction::cli::{
 };
 use halcyon_reconstruction::core::features::FeatureError;
 use halcyon_reconstruction::core::self_calibrate::SelfCalibrateError;
-use halcyon_reconstruction::files::FileError;
+use halcyon_reconstruction::files::{FileError, OutputError};
 use nalgebra::Rotation3;
 use support::samples;
 use support::scene::{default_rig, pose, render};
@@ -116,6 +116,22 @@ fn self_calibrate_finds_the_bend_and_writes_a_rig_that_reads_back() {
         assert!(json[key]["deg"].is_number() && json[key]["sigma_deg"].is_number(), "{key}");
     }
     assert!(json["has_drifted"].is_boolean());
+    assert!((report.pitch.deg_high - report.pitch.deg - 1.96 * report.pitch.sigma_deg).abs() < 1e-4, "95 %");
+    assert_eq!(report.warnings, [""; 0], "0.41 m are near the calibration's 0.4 m");
+}
+
+/// A length that does not suit the calibration in force scales every distance, and pictures cannot tell.
+#[test]
+fn a_length_far_from_the_calibrations_is_warned_of() {
+    let bent = Bent::new();
+    let warnings = |change: &dyn Fn(&mut SelfCalibrateOptions<'_>)| {
+        bent.self_calibrate("left*.pgm", "right*.pgm", change).unwrap().warnings.join("\n")
+    };
+    let baseline = warnings(&|o| o.baseline_m = Some(4.0));
+    assert!(baseline.contains("--baseline 4 m is 10.0") && baseline.contains("0.4000 m of the calibration"), "{baseline}");
+    let altitude = warnings(&|o| o.altitude_m = Some(50.0));
+    assert!(altitude.contains("with --altitude 50 m the baseline comes out at") && altitude.contains("95 %"), "{altitude}");
+    assert_eq!((warnings(&|o| o.altitude_m = Some(4.0)), warnings(&|_| {})), (String::new(), String::new()));
 }
 
 #[test]
@@ -163,7 +179,10 @@ fn bad_input_to_self_calibrate_is_named() {
     assert!(as_rig.is_ok(), "{as_rig:?}");
     let options = SelfCalibrateOptions { rig: &picture, ..options_of("left", "right") };
     assert!(matches!(cli::self_calibrate(&options, &mut |_, _| {}), Err(E::Rig(_))));
-    assert!(matches!(with(&|o| o.out = Some(Path::new("/nowhere/new.yaml"))), Err(E::File(FileError::Write { .. }))));
+    assert!(matches!(
+        with(&|o| o.out = Some(Path::new("/nowhere/new.yaml"))),
+        Err(E::File(FileError::Output(OutputError::NoFolder { .. })))
+    ));
 }
 
 fn options_of<'a>(left: &'a str, right: &'a str) -> SelfCalibrateOptions<'a> {
@@ -238,6 +257,15 @@ fn features_of_a_pair_with_and_without_its_rig() {
     // A picture against itself: F is open, or anything; the counts stand.
     let same = &cli::features(&features_options(&left, &left)).unwrap().rows[0];
     assert_eq!((same.left, same.matches), (same.right, same.left));
+    // A cloud that does not come about is said, and the rest is there all the same.
+    let blank = bent.path("blank.pgm");
+    write_pgm(&blank, &Image::new(320, 240, vec![90; 320 * 240].into()).unwrap());
+    let (picture, none) = (bent.path("blank.png"), bent.path("none.ply"));
+    let nothing =
+        FeaturesOptions { rig: Some(&rig), out: Some(&picture), cloud: Some(&none), ..features_options(&blank, &blank) };
+    let report = cli::features(&nothing).unwrap();
+    assert_eq!((report.files, report.missing[0].path.clone()), (vec![picture], none.clone()));
+    assert!(!none.exists() && report.missing[0].why.starts_with("no epipolar geometry"));
 }
 
 #[test]
@@ -259,8 +287,11 @@ fn bad_input_to_features_is_named() {
         assert!(matches!(run(&|o| o.keypoints_max = bad), Err(E::Range { .. })), "{bad}");
     }
     assert!(matches!(run(&|o| o.cloud = Some(Path::new("a.ply"))), Err(E::CloudWithoutRig)));
-    assert!(matches!(run(&|o| o.out = Some(Path::new("a.jpg"))), Err(E::File(FileError::Extension { .. }))));
-    assert!(matches!(run(&|o| o.out = Some(Path::new("/nowhere/a.png"))), Err(E::File(FileError::Write { .. }))));
+    assert!(matches!(run(&|o| o.out = Some(Path::new("a.jpg"))), Err(E::File(FileError::Output(OutputError::Ending { .. })))));
+    assert!(matches!(
+        run(&|o| o.out = Some(Path::new("/nowhere/a.png"))),
+        Err(E::File(FileError::Output(OutputError::NoFolder { .. })))
+    ));
     assert!(matches!(run(&|o| o.left = Path::new("/nowhere.png")), Err(E::File(FileError::Read { .. }))));
     assert!(matches!(run(&|o| o.rig = Some(Path::new("/nowhere.yaml"))), Err(E::Rig(_))));
     let small = bent.path("small.pgm");
@@ -274,4 +305,11 @@ fn bad_input_to_features_is_named() {
     let of_another = FeaturesOptions { rig: Some(&rig), ..features_options(&aloe, &right) };
     assert!(matches!(cli::features(&of_another), Err(E::Size { width_px: 1282, rig_width_px: 320, .. })));
     assert!(!bent.path("matches.png").exists());
+    // With all methods it is the files of each that must not be inputs.
+    let (picture, out) = (bent.path("m-orb.png"), bent.path("m.png"));
+    std::fs::copy(&left, &picture).unwrap();
+    let all = FeaturesOptions { method: "all", out: Some(&out), ..features_options(&picture, &right) };
+    let refused = cli::features(&all).unwrap_err().to_string();
+    assert!(refused.contains("m-orb.png would overwrite an input, that of --left"), "{refused}");
+    assert_eq!(std::fs::read(&picture).unwrap(), std::fs::read(&left).unwrap());
 }

@@ -8,9 +8,9 @@ use std::path::{Path, PathBuf};
 
 use halcyon_model::{Image, PoseAtExposure, StereoPair, rig_yaml};
 use halcyon_reconstruction::cli::{
-    FailedPair, MeshOf, ReconstructCliError, ReconstructOptions, SurveyFrame, given_pose, reconstruct_pair, reconstruct_survey,
+    MeshOf, ReconstructCliError, ReconstructOptions, SurveyFrame, SurveyStep, given_pose, reconstruct_pair, reconstruct_survey,
 };
-use halcyon_reconstruction::files::{FileError, RigFileError};
+use halcyon_reconstruction::files::{FileError, OutputError, RigFileError};
 use support::scene::{default_rig, pose, render};
 
 fn options() -> ReconstructOptions {
@@ -145,24 +145,86 @@ fn a_survey_names_its_bad_pairs_and_goes_on() {
     write_pgm(&frames[2].right, &Image::new(320, 240, vec![0; 320 * 240].into()).unwrap());
     let options = ReconstructOptions { grid: Some(scene.path("g.nc")), ..options() };
     let mut heard = Vec::new();
-    let mut progress = |done: usize, total: usize, failed: Option<&FailedPair>| heard.push((done, total, failed.is_some()));
+    let mut progress =
+        |step: SurveyStep<'_>| heard.push((step.done, step.total, step.outcome.is_some_and(|outcome| outcome.is_err())));
     let report = reconstruct_survey(&default_rig(), &frames, &options, &mut progress).unwrap();
     assert_eq!((report.pairs, report.patches, report.frame), (4, 2, "gravity"));
     let names: Vec<_> = report.failed.iter().map(|failed| failed.name.as_str()).collect();
     assert_eq!(names, ["1", "2"]);
     assert!(report.failed[0].why.contains("l1.pgm is a damaged PBM, PGM or PPM"), "{:?}", report.failed);
-    assert!(report.failed[1].why.starts_with("no water surface was found"), "{:?}", report.failed);
+    assert!(
+        report.failed[1].why.starts_with("no texture in ") && report.failed[1].why.contains("r2.pgm"),
+        "{:?}",
+        report.failed
+    );
     assert!((report.duration_s - 3.0).abs() < 1e-9 && (report.plane.distance_m - 5.0).abs() < 2e-3);
     assert_eq!(heard, [(0, 4, false), (1, 4, false), (2, 4, true), (3, 4, true), (4, 4, false)]);
     let file = netcdf::open(scene.path("g.nc")).unwrap();
     assert_eq!(file.dimension_len("time"), Some(2));
     drop(file);
 
-    let none = reconstruct_survey(&default_rig(), &frames[1..3], &options, &mut |_, _, _| {}).unwrap_err();
+    let none = reconstruct_survey(&default_rig(), &frames[1..3], &options, &mut |_| {}).unwrap_err();
     assert!(none.to_string().starts_with("none of 2 pairs became a patch; the first, 1"), "{none}");
     let cloud = ReconstructOptions { cloud: Some(scene.path("c.ply")), ..options.clone() };
-    let refused = reconstruct_survey(&default_rig(), &frames, &cloud, &mut |_, _, _| {});
+    let refused = reconstruct_survey(&default_rig(), &frames, &cloud, &mut |_| {});
     assert!(matches!(refused, Err(ReconstructCliError::OnePair("--cloud"))));
+}
+
+#[test]
+fn outputs_are_neither_inputs_nor_each_other() {
+    let scene = Scene::new([0.0; 3]);
+    let before = std::fs::read(scene.path("l0.pgm")).unwrap();
+    std::fs::hard_link(scene.path("l0.pgm"), scene.path("left.ply")).unwrap();
+    let check = |change: &dyn Fn(&mut ReconstructOptions), expected: &str| {
+        let mut options = options();
+        change(&mut options);
+        let refused = scene.run(Some(scene.pose), &options).unwrap_err().to_string();
+        assert!(refused.contains(expected), "{refused}");
+    };
+    check(&|o| o.cloud = Some(scene.path("left.ply")), "--cloud");
+    check(&|o| (o.cloud, o.mesh) = (Some(scene.path("x.ply")), Some(scene.path("./x.ply"))), "--mesh and --cloud would write");
+    check(&|o| (o.grid, o.wass) = (Some(scene.path("x.nc")), Some(scene.path("x.nc"))), "--wass and --grid would write");
+    assert_eq!(std::fs::read(scene.path("l0.pgm")).unwrap(), before);
+    assert!(!scene.path("x.ply").exists() && !scene.path("x.nc").exists());
+}
+
+/// Cells too small for the points are the grid's trouble: a cloud, and a mesh of it, need none.
+#[test]
+fn only_what_needs_a_grid_needs_a_grid() {
+    let scene = Scene::new([0.0; 3]);
+    let fine = |change: &dyn Fn(&mut ReconstructOptions)| {
+        let mut options = ReconstructOptions { cell_m: Some(0.001), ..options() };
+        change(&mut options);
+        scene.run(Some(scene.pose), &options)
+    };
+    for change in [
+        &(|o: &mut ReconstructOptions| o.grid = Some(scene.path("g.nc"))) as &dyn Fn(&mut ReconstructOptions),
+        &|o| (o.mesh, o.mesh_of) = (Some(scene.path("m.ply")), MeshOf::Grid),
+        &|_| {},
+    ] {
+        let refused = fine(change).unwrap_err();
+        assert!(matches!(refused, ReconstructCliError::Cell { .. }) && refused.to_string().contains("--cell"), "{refused}");
+    }
+    assert!(!scene.path("g.nc").exists() && !scene.path("m.ply").exists());
+    let report = fine(&|o| (o.cloud, o.mesh) = (Some(scene.path("c.ply")), Some(scene.path("m.ply")))).unwrap();
+    assert!(report.warnings[0].contains("cells of 0.001 m") && report.patch.cell_m > 0.05, "{report:?}");
+    let (points, _) = ply(&scene.path("c.ply"));
+    assert_eq!(points.len(), report.points as usize);
+    assert!(scene.path("m.ply").exists());
+}
+
+#[test]
+fn poses_and_planes_that_cannot_be_are_refused() {
+    let scene = Scene::new([0.0; 3]);
+    let at = |roll_deg, height_m| given_pose([roll_deg, 0.0, 0.0], height_m, 0.3, 0.5).unwrap();
+    let sky = scene.run(Some(at(95.0, 5.0)), &options()).unwrap_err().to_string();
+    assert!(sky.contains("looks 95° off straight down"), "{sky}");
+    // The pictures were taken level: a roll of 40° makes the water lean by as much.
+    let steep = scene.run(Some(at(40.0, 5.0)), &options());
+    assert!(matches!(&steep, Err(ReconstructCliError::Impossible(_) | ReconstructCliError::Reconstruct(_))), "{steep:?}");
+    let leaning = scene.run(Some(at(15.0, 5.0)), &options()).unwrap();
+    assert!(leaning.warnings.iter().any(|warning| warning.contains("leans 15°")), "{:?}", leaning.warnings);
+    assert_eq!(scene.run(Some(scene.pose), &options()).unwrap().warnings, [""; 0]);
 }
 
 #[test]
@@ -190,7 +252,7 @@ fn careless_use_is_refused() {
     let black = Image::new(320, 240, vec![0; 320 * 240].into()).unwrap();
     write_pgm(&scene.path("black.pgm"), &black);
     write_pgm(&scene.path("small.pgm"), &Image::new(160, 120, vec![9; 160 * 120].into()).unwrap());
-    check(&scene.path("black.pgm"), &scene.path("black.pgm"), &rig, "no water surface was found");
+    check(&scene.path("black.pgm"), &scene.path("black.pgm"), &rig, "no texture in ");
     check(&scene.path("small.pgm"), &right, &rig, "160x120 px does not belong to a calibration for 320x240");
     check(&scene.path("no.pgm"), &right, &rig, "no.pgm");
     check(&left, &write("text.png", b"no picture"), &rig, "text.png is not a picture");
@@ -211,14 +273,17 @@ fn careless_use_is_refused() {
     for max_px in [0, 320, u32::MAX] {
         assert!(matches!(with(&|o| o.max_disparity_px = Some(max_px)), ReconstructCliError::Value { .. }));
     }
-    let extension = |error| assert!(matches!(error, ReconstructCliError::File(FileError::Extension { .. })), "{error}");
+    let extension = |error| {
+        let is_ending = matches!(error, ReconstructCliError::File(FileError::Output(OutputError::Ending { .. })));
+        assert!(is_ending, "{error}");
+    };
     extension(with(&|o| o.cloud = Some("c.obj".into())));
     extension(with(&|o| o.disparity = Some("d".into())));
     extension(with(&|o| o.grid = Some("g.csv".into())));
     let unwritable = with(&|o| o.grid = Some("/nowhere/g.nc".into()));
-    assert!(matches!(unwritable, ReconstructCliError::File(FileError::Write { .. })), "{unwritable}");
+    assert!(matches!(unwritable, ReconstructCliError::File(FileError::Output(OutputError::NoFolder { .. }))), "{unwritable}");
     let unwritable = with(&|o| o.cloud = Some("/nowhere/c.ply".into()));
-    assert!(matches!(unwritable, ReconstructCliError::File(FileError::Write { .. })), "{unwritable}");
+    assert!(matches!(unwritable, ReconstructCliError::File(FileError::Output(OutputError::NoFolder { .. }))), "{unwritable}");
     assert!(matches!(
         reconstruct_pair(&left, &right, &scene.path("bad.yaml"), None, &options()),
         Err(ReconstructCliError::Rig(RigFileError::Content { .. }))

@@ -12,7 +12,9 @@
 //! drift raises the bounds and never lowers them.
 //! **Invariant:** nothing under `core` knows the time, the bus or the disk, and nothing here knows a vehicle.
 
+pub mod cli;
 pub mod core;
+pub mod table;
 
 mod actor;
 mod config;

@@ -5,8 +5,8 @@ use std::process::ExitCode;
 
 use halcyon_model::RigCalibration;
 use halcyon_reconstruction::cli::{self, CalibrateReport, CalibrateRequest, CameraReport};
-use halcyon_reconstruction::core::calibrate::Options;
-use halcyon_reconstruction::files::FileError;
+use halcyon_reconstruction::core::calibrate::{Options, SIGMAS_95};
+use halcyon_reconstruction::files::write_bytes;
 
 use super::{bad_input, output};
 
@@ -27,19 +27,19 @@ pub(super) struct Args {
     /// Inner corners of the board
     #[arg(long, value_name = "COLSxROWS", required_unless_present = "from")]
     board: Option<String>,
-    /// Side of one square, metres
+    /// Side of one square, metres: 0.025 for 25 mm
     #[arg(long, value_name = "M", required_unless_present = "from", allow_negative_numbers = true)]
     square: Option<f64>,
     /// Convert this calibration instead: an OpenCV YAML file, or a folder with ROS's left.yaml and right.yaml
     #[arg(long, value_name = "PATH", conflicts_with_all = ["left", "right", "board", "square", "report"])]
     from: Option<PathBuf>,
-    /// Write the calibration here, as OpenCV YAML
+    /// Write the calibration here, as OpenCV YAML (.yaml or .yml)
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Write the calibration into this folder, as ROS camera_info: left.yaml and right.yaml
     #[arg(long, value_name = "DIR")]
     ros: Option<PathBuf>,
-    /// Write a report here, one HTML page to look at
+    /// Write a report here, one HTML page to look at (.html)
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
     /// Take the board for flat; otherwise its warp is estimated where the pictures show one
@@ -64,12 +64,29 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         let rig = cli::convert_rig(from, args.out.as_deref(), args.ros.as_deref()).map_err(bad_input)?;
         return show_rig(args, &rig);
     }
+    let request = request(args);
+    request.check(args.report.as_deref()).map_err(bad_input)?;
     let bar = output::bar("corners");
     let mut progress = |done: usize, total: usize| {
         bar.set_length(total as u64);
         bar.set_position(done as u64);
     };
-    let request = CalibrateRequest {
+    let done = cli::calibrate(&request, &mut progress);
+    bar.finish_and_clear();
+    let (report, calibration) = done.map_err(bad_input)?;
+    if let Some(path) = &args.report {
+        let page = page::page(&report, &calibration)?;
+        write_bytes(path, page.as_bytes()).map_err(bad_input)?;
+    }
+    if args.json {
+        output::json(&report)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    show(args, &report)
+}
+
+fn request(args: &Args) -> CalibrateRequest<'_> {
+    CalibrateRequest {
         left: args.left.as_deref().unwrap_or_default(),
         right: args.right.as_deref().unwrap_or_default(),
         board: args.board.as_deref().unwrap_or_default(),
@@ -82,19 +99,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         },
         out: args.out.as_deref(),
         ros: args.ros.as_deref(),
-    };
-    let done = cli::calibrate(&request, &mut progress);
-    bar.finish_and_clear();
-    let (report, calibration) = done.map_err(bad_input)?;
-    if let Some(path) = &args.report {
-        let page = page::page(&report, &calibration)?;
-        std::fs::write(path, page).map_err(|source| bad_input(FileError::Write { path: path.clone(), source }))?;
     }
-    if args.json {
-        output::json(&report)?;
-        return Ok(ExitCode::SUCCESS);
-    }
-    show(args, &report)
 }
 
 fn show(args: &Args, report: &CalibrateReport) -> anyhow::Result<ExitCode> {
@@ -114,14 +119,15 @@ fn show(args: &Args, report: &CalibrateReport) -> anyhow::Result<ExitCode> {
     for (name, camera) in [("left", &report.left), ("right", &report.right)] {
         output::line(&format!("{name:<10} {}", camera_line(camera)))?;
     }
-    if let Some([columns_m, rows_m]) = report.board_warp_m {
-        output::line(&format!("board warp {:.3} mm along rows, {:.3} mm along columns", 1e3 * columns_m, 1e3 * rows_m))?;
+    if let (Some(warp), Some(high)) = (report.board_warp_m, report.board_warp_m_high) {
+        let [along_rows, along_columns] = [0, 1].map(|k| format!("{:.3} ± {:.3} mm", 1e3 * warp[k], 1e3 * (high[k] - warp[k])));
+        output::line(&format!("board warp {along_rows} along rows, {along_columns} along columns (95 %)"))?;
     }
     let depth = &report.depth_uncertainty;
     if let (Some(median_m), Some(max_m)) = (depth.median_m, depth.max_m) {
-        let (median_mm, max_mm) = (1e3 * median_m, 1e3 * max_m);
+        let [median_mm, max_mm] = [median_m, max_m].map(|sigma_m| 1e3 * SIGMAS_95 * sigma_m);
         output::line(&format!(
-            "depth      at {} m known to {median_mm:.1} mm (1 σ, median), {max_mm:.1} mm at worst",
+            "depth      at {} m known to ± {median_mm:.1} mm (95 %, median over the picture), ± {max_mm:.1} mm at worst",
             depth.distance_m
         ))?;
     }
@@ -129,10 +135,13 @@ fn show(args: &Args, report: &CalibrateReport) -> anyhow::Result<ExitCode> {
 }
 
 fn camera_line(camera: &CameraReport) -> String {
-    let CameraReport { fx_px, fy_px, cx_px, cy_px, sigmas, rms_px, .. } = camera;
+    let CameraReport { fx_px, fy_px, cx_px, cy_px, rms_px, .. } = camera;
     format!(
-        "fx {fx_px:.2} ± {:.2} fy {fy_px:.2} ± {:.2} cx {cx_px:.2} ± {:.2} cy {cy_px:.2} ± {:.2} px (1 σ), RMS {rms_px:.3} px",
-        sigmas[0], sigmas[1], sigmas[2], sigmas[3]
+        "fx {fx_px:.2} ± {:.2} fy {fy_px:.2} ± {:.2} cx {cx_px:.2} ± {:.2} cy {cy_px:.2} ± {:.2} px (95 %), RMS {rms_px:.3} px",
+        camera.fx_px_high - fx_px,
+        camera.fy_px_high - fy_px,
+        camera.cx_px_high - cx_px,
+        camera.cy_px_high - cy_px
     )
 }
 

@@ -40,7 +40,7 @@ pub(super) struct Args {
     /// Picture of the matches before and after RANSAC (.png); with all methods, one each
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Triangulated matches (.ply); needs --rig
+    /// Triangulated matches (.ply), metres; needs --rig. Exit code 1 where there are none
     #[arg(long, value_name = "FILE")]
     cloud: Option<PathBuf>,
     /// Print the result as JSON
@@ -65,9 +65,14 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     });
     spinner.finish_and_clear();
     let report = report.map_err(bad_input)?;
+    // What there is, is shown; that a file asked for is not there is a failure all the same.
+    for cloud in &report.missing {
+        output::note(&format!("error: --cloud {} is not written: {}", cloud.path.display(), cloud.why));
+    }
+    let code = if report.missing.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE };
     if args.json {
         output::json(&report)?;
-        return Ok(ExitCode::SUCCESS);
+        return Ok(code);
     }
     output::line("           before RANSAC            after RANSAC")?;
     output::line("method      left   right  matches    left   right")?;
@@ -99,7 +104,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     for file in &report.files {
         output::line(&format!("written    {}", file.display()))?;
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(code)
 }
 
 fn matrix<const N: usize>(name: &str, rows: &[[f64; N]]) -> anyhow::Result<()> {

@@ -2,13 +2,15 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::time::Instant;
 
 use halcyon_chassis::ConfigError;
+use halcyon_chassis::clock::{Clock, ClockConfig};
 use serde::Serialize;
 
 use super::output;
 use crate::accuracy::Extent;
-use crate::lab::{self, Exhibit, Experiment, Finding, Lab, LabError};
+use crate::lab::{self, Exhibit, Experiment, Finding, Lab, LabError, Part};
 
 /// Make the thesis's tables and figures again, its values beside ours
 #[derive(Debug, clap::Args)]
@@ -28,7 +30,7 @@ pub(super) struct Args {
     /// OpenCV's sample pictures, as `make samples` fetches them
     #[arg(long, value_name = "FOLDER", default_value = "samples")]
     samples: PathBuf,
-    /// Report with every figure (index.html), clouds and meshes (.ply)
+    /// Report with every figure (index.html), clouds and meshes (.ply): written after each experiment, beside what earlier runs have left there
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
     /// Print the result as JSON
@@ -64,24 +66,34 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         return list(&chosen, args.json);
     }
     let lab = Lab::new(args.samples.clone(), if args.quick { Extent::Quick } else { Extent::Full });
+    if let Some(out) = &args.out {
+        let is_writable = std::fs::create_dir_all(out).and_then(|()| tempfile::tempfile_in(out).map(drop));
+        is_writable.map_err(|error| ConfigError::new(format!("--out {}: {error}", out.display())))?;
+    }
     let bar = output::bar("experiments");
     bar.set_length(chosen.len() as u64);
+    let total = chosen.len();
     let mut exhibits: Vec<(&Experiment, Exhibit)> = Vec::new();
-    for experiment in chosen {
+    for (number, experiment) in chosen.into_iter().enumerate() {
         bar.set_message(experiment.name);
-        match experiment.run(&lab) {
-            Ok(exhibit) => exhibits.push((experiment, exhibit)),
+        let begun = Instant::now();
+        let exhibit = match experiment.run(&lab) {
+            Ok(exhibit) => exhibit,
             Err(error) => {
                 bar.finish_and_clear();
                 return Err(failed(experiment, error));
             }
+        };
+        // What is done is safe, whatever becomes of the rest.
+        if let Some(out) = &args.out {
+            let part = Part::new(experiment, &exhibit, &run_of(args.quick));
+            lab::write(out, &part, &exhibit).map_err(|error| ConfigError::new(format!("{}: {error}", out.display())))?;
         }
+        output::step(&bar, &format!("[{}/{total}] {}: {:.1} s", number + 1, experiment.name, begun.elapsed().as_secs_f64()));
+        exhibits.push((experiment, exhibit));
         bar.inc(1);
     }
     bar.finish_and_clear();
-    if let Some(out) = &args.out {
-        lab::write(out, &exhibits).map_err(|error| ConfigError::new(format!("{}: {error}", out.display())))?;
-    }
     if args.json {
         let experiments = exhibits.iter().map(|(experiment, exhibit)| Row::new(experiment, Some(&exhibit.findings))).collect();
         output::json(&Report { experiments })?;
@@ -92,6 +104,14 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Which run a part of the report is of.
+fn run_of(quick: bool) -> String {
+    let now =
+        jiff::Timestamp::from_second(Clock::new(&ClockConfig::default()).now().as_nanos() / 1_000_000_000).unwrap_or_default();
+    let extent = if quick { "Quick run (smaller pictures, fewer pairs than the text may say)" } else { "Full run" };
+    format!("{extent} of {}.", now.strftime("%Y-%m-%d %H:%M UTC"))
 }
 
 /// Missing pictures are bad input; what cannot be measured is a failure.

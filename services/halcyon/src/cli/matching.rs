@@ -21,11 +21,12 @@ pub(super) struct Args {
     /// Right picture, rectified
     #[arg(long, value_name = "FILE")]
     right: PathBuf,
-    /// Largest disparity to search, pixels
+    /// Largest disparity to search, pixels. OpenCV's engines search up to the next multiple of 16; what they find beyond this is dropped
     #[arg(long, value_name = "PX", allow_negative_numbers = true)]
     max_disparity: f64,
-    /// For work guided (about a plane, sgm where there is none), sgm, sgm8, or OpenCV's bm, sgbm, sgbm-3way, sgbm-hh4 or sgbm-hh. For study the reference matcher: wta-COST (winner takes all) or
-    /// sgm-COST (semi-global), where COST is sad, ssd, ncc, rank, census or mi
+    /// For work guided (about a plane, sgm where there is none), sgm, sgm8, or OpenCV's bm, sgbm, sgbm-3way, sgbm-hh4 or sgbm-hh.
+    /// For study the reference matcher: wta-COST (winner takes all) or sgm-COST (semi-global), where COST is sad, ssd, ncc, rank,
+    /// census or mi
     #[arg(long, default_value = "guided")]
     engine: String,
     /// Side of the window, pixels, odd; without it what suits the engine
@@ -99,6 +100,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let report = cli::match_pair(&args.left, &args.right, args.max_disparity, &args.engine, &options, &args.out);
     spinner.finish_and_clear();
     let report = report.map_err(bad_input)?;
+    output::warnings(&report.warnings);
     if args.json {
         output::json(&report)?;
         return Ok(ExitCode::SUCCESS);

@@ -13,7 +13,10 @@ mod rig;
 mod run;
 mod self_calibrate;
 mod sim;
+mod survey;
 mod up;
+mod usage;
+mod waves;
 
 use std::process::ExitCode;
 
@@ -49,6 +52,10 @@ enum Command {
     Reconstruct(reconstruct::Args),
     /// Say what a rig can measure, from which altitude: footprint, noise, smallest waves, best altitude
     Rig(rig::Args),
+    /// Judge the sea state of a survey folder: heights with intervals, verdict, maps, report
+    Survey(survey::Args),
+    /// Say everything about the waves in a file of elevations
+    Waves(waves::Args),
     /// Judge accuracy against water that is known exactly, beside the thesis's figures
     Bench(bench::Args),
     /// Make the thesis's tables and figures again, its values beside ours
@@ -64,7 +71,12 @@ enum Command {
 /// Runs the program.
 #[must_use]
 pub fn main() -> ExitCode {
-    let Cli { options, command } = Cli::parse();
+    let Cli { options, command } = match Cli::try_parse() {
+        Ok(cli) => cli,
+        // Help and version are no errors, and are printed as they are.
+        Err(error) if !error.use_stderr() => error.exit(),
+        Err(error) => return process::fail(&halcyon_chassis::ConfigError::new(usage::one_line(&error)).into()),
+    };
     let outcome = match command {
         Command::Up(args) => up::run(&options, &args),
         Command::Run(args) => run::run(&options, &args),
@@ -74,6 +86,8 @@ pub fn main() -> ExitCode {
         Command::Match(args) => matching::run(&args),
         Command::Reconstruct(args) => reconstruct::run(&args),
         Command::Rig(args) => rig::run(&args),
+        Command::Waves(args) => waves::run(&options, &args),
+        Command::Survey(args) => survey::run(&options, &args),
         Command::Bench(args) => bench::run(&args),
         Command::Lab(args) => lab::run(&args),
         Command::Mission(args) => mission::run(args),

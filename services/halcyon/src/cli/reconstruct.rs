@@ -6,7 +6,9 @@ use std::process::ExitCode;
 use halcyon_capture::SurveyFolder;
 use halcyon_chassis::clock::{Clock, ClockConfig};
 use halcyon_model::PoseAtExposure;
-use halcyon_reconstruction::cli::{self, MeshOf, PatchReport, PlaneReport, ReconstructOptions, SurveyFrame};
+use halcyon_reconstruction::cli::{self, MeshOf, PatchReport, PlaneReport, ReconstructOptions, SurveyFrame, SurveyStep};
+use halcyon_reconstruction::core::calibrate::SIGMAS_95;
+use indicatif::ProgressBar;
 
 use super::{bad_input, output};
 
@@ -66,9 +68,11 @@ struct Pose {
     attitude_sigma_deg: f64,
 }
 
+/// How pairs are reconstructed.
 #[derive(Debug, clap::Args)]
-struct How {
-    /// bm, sgbm, sgbm-3way, sgbm-hh, sgm or sgm8
+pub(super) struct How {
+    /// guided (about the mean plane, sgm where there is none), sgm, sgm8, or OpenCV's bm, sgbm, sgbm-3way, sgbm-hh4 or sgbm-hh; for study
+    /// wta-COST or sgm-COST, where COST is sad, ssd, ncc, rank, census or mi
     #[arg(long, default_value = "guided")]
     engine: String,
     /// Cell of the elevation grid, metres; otherwise about ten pixels
@@ -122,25 +126,39 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
 
 fn options(args: &Args) -> ReconstructOptions {
     let (how, outputs) = (&args.how, &args.outputs);
-    // As typed, but without the paths of the machine it was typed on.
-    let words = std::env::args_os().skip(1).map(|word| match Path::new(&word).file_name() {
-        Some(name) if Path::new(&word).is_absolute() => name.to_string_lossy().into_owned(),
-        _ => word.to_string_lossy().into_owned(),
-    });
     ReconstructOptions {
-        engine: how.engine.clone(),
-        cell_m: how.cell,
-        stride_px: how.stride,
-        max_disparity_px: how.max_disparity,
         cloud: outputs.cloud.clone(),
         mesh: outputs.mesh.clone(),
         mesh_of: if outputs.mesh_of == MeshFrom::Grid { MeshOf::Grid } else { MeshOf::Cloud },
         disparity: outputs.disparity.clone(),
         grid: outputs.grid.clone(),
         wass: outputs.wass.clone(),
-        now: Clock::new(&ClockConfig::default()).now(),
-        command: format!("halcyon {}", words.collect::<Vec<_>>().join(" ")),
+        ..how.options()
     }
+}
+
+impl How {
+    /// Without outputs.
+    pub(super) fn options(&self) -> ReconstructOptions {
+        ReconstructOptions {
+            engine: self.engine.clone(),
+            cell_m: self.cell,
+            stride_px: self.stride,
+            max_disparity_px: self.max_disparity,
+            now: Clock::new(&ClockConfig::default()).now(),
+            command: as_typed(),
+            ..ReconstructOptions::default()
+        }
+    }
+}
+
+/// The command as typed, but without the paths of the machine it was typed on: for the history of files.
+pub(super) fn as_typed() -> String {
+    let words = std::env::args_os().skip(1).map(|word| match Path::new(&word).file_name() {
+        Some(name) if Path::new(&word).is_absolute() => name.to_string_lossy().into_owned(),
+        _ => word.to_string_lossy().into_owned(),
+    });
+    format!("halcyon {}", words.collect::<Vec<_>>().join(" "))
 }
 
 fn pair(left: &Path, right: &Path, rig: &Path, args: &Args, options: &ReconstructOptions) -> anyhow::Result<ExitCode> {
@@ -150,6 +168,7 @@ fn pair(left: &Path, right: &Path, rig: &Path, args: &Args, options: &Reconstruc
     let report = cli::reconstruct_pair(left, right, rig, pose, options);
     spinner.finish_and_clear();
     let report = report.map_err(bad_input)?;
+    output::warnings(&report.warnings);
     if args.json {
         output::json(&report)?;
         return Ok(ExitCode::SUCCESS);
@@ -166,25 +185,12 @@ fn survey(folder: &Path, args: &Args, options: &ReconstructOptions) -> anyhow::R
     // Checks the standard deviations: the folder has the rest.
     cli::given_pose([0.0; 3], 1.0, args.pose.height_sigma_m, args.pose.attitude_sigma_deg).map_err(bad_input)?;
     let survey = SurveyFolder::open_tolerant(folder).map_err(bad_input)?;
-    let frame = |frame: &halcyon_capture::Frame| SurveyFrame {
-        name: frame.row.name.clone(),
-        stamp: frame.stamp(),
-        left: frame.left().to_owned(),
-        right: frame.right().to_owned(),
-        pose: frame.pose(args.pose.height_sigma_m, args.pose.attitude_sigma_deg.to_radians()),
-    };
-    let frames: Vec<SurveyFrame> = survey.frames().iter().map(frame).collect();
+    let frames = frames(&survey, args.pose.height_sigma_m, args.pose.attitude_sigma_deg);
     let bar = output::bar("pairs");
-    let mut progress = |done: usize, total: usize, failure: Option<&cli::FailedPair>| {
-        bar.set_length(total as u64);
-        bar.set_position(done as u64);
-        if let Some(failure) = failure {
-            bar.println(format!("left out   {}: {}", failure.name, failure.why));
-        }
-    };
-    let report = cli::reconstruct_survey(survey.rig(), &frames, options, &mut progress);
+    let report = cli::reconstruct_survey(survey.rig(), &frames, options, &mut |step| show(&bar, step));
     bar.finish_and_clear();
     let report = report.map_err(bad_input)?;
+    output::warnings(&report.warnings);
     if args.json {
         output::json(&report)?;
         return Ok(ExitCode::SUCCESS);
@@ -204,6 +210,27 @@ fn survey(folder: &Path, args: &Args, options: &ReconstructOptions) -> anyhow::R
     written(options)
 }
 
+/// The pairs of a survey with what is known of the carrier's poses.
+pub(super) fn frames(survey: &SurveyFolder, height_sigma_m: f64, attitude_sigma_deg: f64) -> Vec<SurveyFrame> {
+    let frame = |frame: &halcyon_capture::Frame| SurveyFrame {
+        name: frame.row.name.clone(),
+        stamp: frame.stamp(),
+        left: frame.left().to_owned(),
+        right: frame.right().to_owned(),
+        pose: frame.pose(height_sigma_m, attitude_sigma_deg.to_radians()),
+    };
+    survey.frames().iter().map(frame).collect()
+}
+
+/// How far a survey is, and what was left out of it.
+pub(super) fn show(bar: &ProgressBar, step: SurveyStep<'_>) {
+    bar.set_length(step.total as u64);
+    bar.set_position(step.done as u64);
+    if let Some(Err(failure)) = step.outcome {
+        bar.println(format!("left out   {}: {}", failure.name, failure.why));
+    }
+}
+
 impl Pose {
     fn given(&self) -> Result<Option<PoseAtExposure>, cli::ReconstructCliError> {
         let attitude_deg = [self.roll_deg, self.pitch_deg, self.heading_deg];
@@ -220,16 +247,16 @@ fn surface(plane: &PlaneReport, patch: &PatchReport) -> anyhow::Result<()> {
         plane.rms_m * 1e3
     ))?;
     output::line(&format!(
-        "patch      {} x {} cells of {} m, {:.1} % measured, sigma {:.2} mm, elevation RMS {:.2} mm",
+        "patch      {} x {} cells of {} m, {:.1} % measured, each to ± {:.2} mm (95 %), elevation RMS {:.2} mm",
         patch.rows,
         patch.cols,
         patch.cell_m,
         patch.coverage * 100.0,
-        patch.sigma_m * 1e3,
+        SIGMAS_95 * patch.sigma_m * 1e3,
         patch.elevation_rms_m * 1e3
     ))?;
     if let (Some(level_m), Some(low_m), Some(high_m)) = (patch.level_m, patch.level_m_low, patch.level_m_high) {
-        output::line(&format!("level      {level_m:.3} m above the datum ({low_m:.3} to {high_m:.3})"))?;
+        output::line(&format!("level      {level_m:.3} m above the datum (95 %: {low_m:.3} to {high_m:.3} m)"))?;
     }
     Ok(())
 }

@@ -1,12 +1,14 @@
 //! `halcyon rig`
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use halcyon_chassis::ConfigError;
 use halcyon_reconstruction::cli::{self, BudgetRow, RigOptions, RigReport, RigSource};
-use halcyon_reconstruction::files::{FileError, write_bytes};
+use halcyon_reconstruction::core::calibrate::SIGMAS_95;
+use halcyon_reconstruction::files::{Output, check_outputs, has_ending, rig_files, write_bytes};
 
+use super::output::significant;
 use super::{bad_input, output};
 use crate::report::{Chart, ChartError, Page, Series};
 
@@ -61,10 +63,14 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let as_page = args.plot.as_deref().map(is_page).transpose().map_err(bad_input)?;
+    if let Some(plot) = &args.plot {
+        let files = args.rig.as_deref().map(rig_files).unwrap_or_default();
+        let inputs = files.iter().map(|path| ("--rig", path.as_path()));
+        check_outputs(inputs, &[Output::file("--plot", plot, &["svg", "html", "htm"])]).map_err(bad_input)?;
+    }
     let report = cli::rig(&options(args)?).map_err(bad_input)?;
-    if let (Some(path), Some(as_page)) = (&args.plot, as_page) {
-        let drawn = if as_page { page(&report)? } else { noise(&report).svg()? };
+    if let Some(path) = &args.plot {
+        let drawn = if has_ending(path, &["svg"]) { noise(&report).svg()? } else { page(&report)? };
         write_bytes(path, drawn.as_bytes()).map_err(bad_input)?;
     }
     if args.json {
@@ -98,46 +104,53 @@ fn options(args: &Args) -> anyhow::Result<RigOptions> {
     })
 }
 
-fn is_page(path: &Path) -> Result<bool, FileError> {
-    match path.extension().and_then(std::ffi::OsStr::to_str).map(str::to_ascii_lowercase).as_deref() {
-        Some("html" | "htm") => Ok(true),
-        Some("svg") => Ok(false),
-        _ => Err(FileError::Extension { path: path.to_owned(), expected: ".svg or .html" }),
-    }
-}
-
-const COLUMNS: [&str; 9] =
-    ["altitude m", "disparity px", "shared m", "overlap %", "pixel mm", "point mm", "cell mm", "lengths m", "sea heights m"];
+const COLUMNS: [&str; 9] = [
+    "altitude m",
+    "disparity px",
+    "shared m",
+    "overlap %",
+    "pixel mm",
+    "point ± mm (95 %)",
+    "cell ± mm (95 %)",
+    "lengths m",
+    "sea heights m",
+];
+/// Neighbours in the table differ by a few percent: fewer digits would make them the same.
+const DIGITS: i32 = 4;
 
 fn columns(row: &BudgetRow) -> [String; 9] {
     let range = |low: Option<f64>, high: Option<f64>| match (low, high) {
-        (Some(low), Some(high)) if low <= high => format!("{low:.3} – {high:.2}"),
+        (Some(low), Some(high)) if low <= high => format!("{} – {}", number(low), number(high)),
         _ => "–".into(),
     };
     [
-        format!("{:.2}", row.altitude_m),
-        format!("{:.1}", row.disparity_px),
-        format!("{:.2} x {:.2}", row.shared_m[0], row.shared_m[1]),
-        format!("{:.0}", row.overlap * 100.0),
-        format!("{:.2}", row.pixel_m * 1e3),
-        format!("{:.2}", row.point_sigma_m * 1e3),
-        format!("{:.2}", row.cell_sigma_m * 1e3),
+        number(row.altitude_m),
+        number(row.disparity_px),
+        format!("{} x {}", number(row.shared_m[0]), number(row.shared_m[1])),
+        format!("{:.1}", row.overlap * 100.0),
+        number(row.pixel_m * 1e3),
+        number(SIGMAS_95 * row.point_sigma_m * 1e3),
+        number(SIGMAS_95 * row.cell_sigma_m * 1e3),
         range(Some(row.wavelength_m_min), Some(row.wavelength_m_max)),
         range(row.wave_height_m_min, row.wave_height_m_max),
     ]
+}
+
+fn number(value: f64) -> String {
+    significant(value, DIGITS)
 }
 
 const BEST_COLUMNS: [&str; 4] = ["wave height m", "its length m", "best altitude m", "10 % from – to m"];
 
 fn best_columns(best: &cli::BestRow) -> [String; 4] {
     let range = match (best.altitude_m_min, best.altitude_m_max) {
-        (Some(low_m), Some(high_m)) => format!("{low_m:.2} – {high_m:.2}"),
+        (Some(low_m), Some(high_m)) => format!("{} – {}", number(low_m), number(high_m)),
         _ => "nowhere".into(),
     };
     [
-        format!("{:.3}", best.wave_height_m),
-        format!("{:.2}", best.wavelength_m),
-        format!("{:.2} (error {:.0} %)", best.altitude_m, best.error * 100.0),
+        number(best.wave_height_m),
+        number(best.wavelength_m),
+        format!("{} (error {} %)", number(best.altitude_m), significant(best.error * 100.0, 2)),
         range,
     ]
 }
@@ -150,15 +163,15 @@ fn usable(report: &RigReport) -> impl Iterator<Item = &BudgetRow> {
 fn summary(report: &RigReport) -> String {
     let rig = &report.rig;
     format!(
-        "{} x {} px, f {:.1} px ({:.1}° wide), baseline {:.4} m, disparity sigma {} px, window {} px; least altitude {:.2} m",
+        "{} x {} px, f {:.1} px ({:.1}° wide), baseline {:.4} m, disparity ± {} px (95 %), window {} px; least altitude {} m",
         rig.width_px,
         rig.height_px,
         rig.focal_px,
         rig.fov_deg,
         rig.baseline_m,
-        rig.disparity_sigma_px,
+        significant(SIGMAS_95 * rig.disparity_sigma_px, 2),
         rig.window_px,
-        report.altitude_m_min
+        number(report.altitude_m_min)
     )
 }
 
@@ -187,8 +200,8 @@ fn noise(report: &RigReport) -> Chart {
         usable(report).map(|row| (row.altitude_m, value(row).unwrap_or(f64::NAN))).collect()
     };
     Chart::new("altitude, m", "metres")
-        .with(Series::line("elevation noise of a point", series(|row| Some(row.point_sigma_m))))
-        .with(Series::line("elevation noise of a cell", series(|row| Some(row.cell_sigma_m))))
+        .with(Series::line("elevation noise of a point, ± (95 %)", series(|row| Some(SIGMAS_95 * row.point_sigma_m))))
+        .with(Series::line("elevation noise of a cell, ± (95 %)", series(|row| Some(SIGMAS_95 * row.cell_sigma_m))))
         .with(Series::dashed("wave height that still water reads", series(|row| Some(row.still_height_m))))
         .with(Series::line("lowest sea within 10 %", series(|row| row.wave_height_m_min)))
         .with(Series::line("highest sea within 10 %", series(|row| row.wave_height_m_max)))
@@ -228,7 +241,7 @@ fn page(report: &RigReport) -> Result<String, ChartError> {
     page.heading("Elevation noise and wave height");
     page.figure(
         &noise(report).svg()?,
-        "One standard deviation of one point and of a cell's mean; the significant wave height that still water would read; and \
+        "Half of the 95 % interval of one point and of a cell's mean; the significant wave height that still water would read; and \
          the fully developed seas whose height comes out within 10 %.",
     );
     page.heading("Footprint and wave length");

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use halcyon_reconstruction::cli;
+use halcyon_reconstruction::core::calibrate::SIGMAS_95;
 
 use super::{bad_input, output};
 
@@ -74,32 +75,35 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let report = cli::self_calibrate(&options, &mut progress);
     bar.finish_and_clear();
     let report = report.map_err(bad_input)?;
+    output::warnings(&report.warnings);
     if args.json {
         output::json(&report)?;
         return Ok(ExitCode::SUCCESS);
     }
     output::line(&format!(
-        "matches    {} of {} pairs by {}, {} used, each to {:.2} px",
+        "matches    {} of {} pairs by {}, {} used, each known to ± {:.2} px (95 %)",
         report.matches,
         report.views.len(),
         report.method,
         report.inliers,
-        report.sigma_px
+        SIGMAS_95 * report.sigma_px
     ))?;
-    output::line("against the calibration in force, the right camera has turned")?;
+    output::line("against the calibration in force, the right camera has turned (95 %)")?;
     for (name, angle) in [("pitch", report.pitch), ("yaw", report.yaw), ("roll", report.roll)] {
-        output::line(&format!("  {name:<8} {:>8.4}° ± {:.4}°", angle.deg, angle.sigma_deg))?;
+        output::line(&format!("  {name:<8} {:>8.4}° ± {:.4}°", angle.deg, angle.deg_high - angle.deg))?;
     }
-    output::line("and the baseline")?;
+    output::line("and the baseline (95 %)")?;
     for (name, angle) in [("down", report.baseline_down), ("forward", report.baseline_forward)] {
-        output::line(&format!("  {name:<8} {:>8.4}° ± {:.4}°", angle.deg, angle.sigma_deg))?;
+        output::line(&format!("  {name:<8} {:>8.4}° ± {:.4}°", angle.deg, angle.deg_high - angle.deg))?;
     }
-    output::line(&format!(
-        "baseline   {:.4} m ({:.4} to {:.4})",
-        report.baseline_m, report.baseline_m_low, report.baseline_m_high
-    ))?;
+    let source = match (args.baseline, args.altitude) {
+        (Some(_), _) => "as given".to_owned(),
+        (None, Some(_)) => format!("95 %: {:.4} to {:.4} m", report.baseline_m_low, report.baseline_m_high),
+        (None, None) => "kept from the calibration".to_owned(),
+    };
+    output::line(&format!("baseline   {:.4} m ({source})", report.baseline_m))?;
     if let (Some(scale), Some(sigma)) = (report.focal_scale, report.focal_scale_sigma) {
-        output::line(&format!("focal      × {scale:.5} ± {sigma:.5}"))?;
+        output::line(&format!("focal      × {scale:.5} ± {:.5} (95 %)", SIGMAS_95 * sigma))?;
     }
     output::line(&format!(
         "row error  {:.3} px RMS before, {:.3} px after; {:.3} px of it is the pose's",

@@ -1,6 +1,7 @@
 //! What an experiment has to show.
 
 use halcyon_reconstruction::core::cloud::PointCloud;
+use halcyon_reconstruction::core::show;
 use halcyon_reconstruction::files::ply;
 use serde::Serialize;
 
@@ -40,6 +41,9 @@ enum Part {
     Png(Vec<u8>, String),
 }
 
+/// Width of the widest pictures, pixels: that of the page, and half as much for sharp screens.
+const SHOWN_PX: u32 = 1200;
+
 /// What an experiment has to show, from top to bottom.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Exhibit {
@@ -75,8 +79,11 @@ impl Exhibit {
         Ok(())
     }
 
+    /// A picture, made as large as a page shows it.
     pub(super) fn png(&mut self, png: Vec<u8>, caption: impl Into<String>) {
-        self.parts.push(Part::Png(png, caption.into()));
+        // What cannot be made smaller is shown as it is.
+        let picture = show::for_page(&png, SHOWN_PX).unwrap_or(png);
+        self.parts.push(Part::Png(picture, caption.into()));
     }
 
     /// A cloud as a PLY file.
@@ -103,7 +110,9 @@ impl Exhibit {
     pub(super) fn rows(&self, experiment: &str) -> Vec<Vec<String>> {
         let row = |finding: &Finding| {
             let thesis = finding.thesis.map_or_else(|| "-".to_owned(), number);
-            vec![experiment.to_owned(), finding.figure.clone(), finding.unit.to_owned(), number(finding.value), thesis]
+            // 1 is no unit to a reader.
+            let unit = if finding.unit == "1" { "" } else { finding.unit };
+            vec![experiment.to_owned(), finding.figure.clone(), unit.to_owned(), number(finding.value), thesis]
         };
         self.findings.iter().map(row).collect()
     }

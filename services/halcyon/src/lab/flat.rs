@@ -27,7 +27,7 @@ pub(super) fn baseline(lab: &Lab) -> Result<Exhibit, LabError> {
     let pair = scene.pair(0.0, Vector3::new(0.0, 0.0, -0.5), &UnitQuaternion::identity(), None)?;
     let mut chain = Reconstructor::new(Settings { cell_m: 0.01, ..Settings::default() });
     if let Ok(patch) = chain.reconstruct(&pair) {
-        exhibit.png(draw(colour::encode_png(chain.disparity()))?, "Figure 5-8: disparity of the plane");
+        exhibit.png(draw(colour::encode_png(&chain.disparity()))?, "Figure 5-8: disparity of the plane");
         if let Ok(cloud) = cli::cloud_of(&chain, &pair, &patch) {
             let step = (cloud.points.len() / 2500).max(1);
             let points = cloud.points.iter().step_by(step).map(|point| (point.at_m.x, MM * point.at_m.z)).collect();

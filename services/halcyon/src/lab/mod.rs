@@ -15,16 +15,14 @@ mod dense;
 mod exhibit;
 mod features;
 mod flat;
+mod parts;
 mod pictures;
 mod speed;
 mod tank;
 
-use std::path::Path;
-
 pub use context::{Lab, LabError};
 pub use exhibit::{Exhibit, File, Finding, number};
-
-use crate::report::Page;
+pub use parts::{Part, page, read_parts, write};
 
 /// One experiment.
 #[derive(Debug, Clone, Copy)]
@@ -182,35 +180,6 @@ pub fn select(wanted: &[String]) -> Result<Vec<&'static Experiment>, &str> {
     }
     let is_wanted = |experiment: &&Experiment| wanted.is_empty() || wanted.iter().any(|name| experiment.is(name));
     Ok(EXPERIMENTS.iter().filter(is_wanted).collect())
-}
-
-/// All exhibits as one page.
-#[must_use]
-pub fn page(exhibits: &[(&Experiment, Exhibit)]) -> String {
-    let mut page = Page::new("Halcyon beside the thesis");
-    page.paragraph(
-        "Every table and figure with a result, made again. The thesis's own pictures are not public: public pictures and simulated water \
-         stand in, so that counts differ with the scene while errors can be compared.",
-    );
-    let rows: Vec<Vec<String>> = exhibits.iter().flat_map(|(experiment, exhibit)| exhibit.rows(experiment.name)).collect();
-    page.table(&["experiment", "figure", "unit", "measured", "thesis"], &rows);
-    for (experiment, exhibit) in exhibits {
-        page.heading(&format!("{} ({})", experiment.about, experiment.shows.join(", ")));
-        exhibit.add_to(&mut page);
-    }
-    page.html()
-}
-
-/// Writes a page and the files of its exhibits into `folder`: `index.html`, clouds and meshes.
-///
-/// # Errors
-/// Where the folder or a file cannot be written.
-pub fn write(folder: &Path, exhibits: &[(&Experiment, Exhibit)]) -> std::io::Result<()> {
-    std::fs::create_dir_all(folder)?;
-    for file in exhibits.iter().flat_map(|(_, exhibit)| &exhibit.files) {
-        std::fs::write(folder.join(&file.name), &file.bytes)?;
-    }
-    std::fs::write(folder.join("index.html"), page(exhibits))
 }
 
 #[cfg(test)]

@@ -210,7 +210,7 @@ fn in_frequency(exhibit: &mut Exhibit, one: &Sensors, is_first: bool) -> Result<
         let mut chart = Chart::new("frequency, Hz", "density, m²/Hz").log_y();
         for (name, samples_m, rate_hz) in one.all().into_iter().take(2) {
             let record = Record::new(samples_m, rate_hz)?.without_mean();
-            let spectrum = Welch { segment_samples: record.samples_m().len() }.spectrum(&record)?;
+            let spectrum = Welch::new(record.samples_m().len()).spectrum(&record)?;
             let density =
                 spectrum.density_m2_per_hz().iter().enumerate().skip(1).map(|(i, s)| (i as f64 * spectrum.df_hz(), *s));
             chart = chart.with(Series::line(name, density.take_while(|point| point.0 <= SHOWN_HZ).collect()));

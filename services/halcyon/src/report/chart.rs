@@ -129,8 +129,11 @@ impl Chart {
         let mut chart = builder.build_cartesian_2d(x.0..x.1, y.0..y.1).map_err(ChartError::draw)?;
         // On a logarithmic axis two digits tell all, and four would run into the axis's name.
         let two_digits = |value: f64| format!("{value:.1e}").parse().unwrap_or(value);
-        let y_text = |y: &f64| scale::label(if self.log_y { two_digits(10_f64.powf(*y)) } else { *y });
-        let x_text = |x: &f64| scale::label(*x);
+        let (x_span, y_span) = (x.1 - x.0, y.1 - y.0);
+        let y_text = |value: &f64| {
+            if self.log_y { scale::label(two_digits(10_f64.powf(*value))) } else { scale::label_in(*value, y_span) }
+        };
+        let x_text = |value: &f64| scale::label_in(*value, x_span);
         let mut mesh = chart.configure_mesh();
         frame::style(&mut mesh);
         mesh.x_desc(&self.x_label).y_desc(&self.y_label).x_label_formatter(&x_text).y_label_formatter(&y_text);
@@ -159,7 +162,14 @@ impl Chart {
                         let drawn = drawn.map_err(ChartError::draw)?;
                         // One name, however often the line is broken.
                         if part == 0 && !name.is_empty() {
-                            drawn.label(name).legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 20, y)], stroke));
+                            let drawn = drawn.label(name);
+                            if series.style == Style::Dashed {
+                                drawn.legend(move |(x, y)| {
+                                    plotters::element::DashedPathElement::new([(x, y), (x + 20, y)], 6, 4, stroke)
+                                });
+                            } else {
+                                drawn.legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 20, y)], stroke));
+                            }
                         }
                     }
                 }

@@ -14,8 +14,14 @@ pub struct Page {
 const STYLE: &str = "body{font:16px/1.5 system-ui,sans-serif;max-width:62rem;margin:2rem auto;padding:0 1rem;color:#1b1b1b;background:#fff}\
 h1{font-size:1.7rem;margin-bottom:.2rem}h2{font-size:1.2rem;margin-top:2rem;border-bottom:1px solid #ddd}\
 table{border-collapse:collapse;margin:.8rem 0;font-variant-numeric:tabular-nums}\
-td,th{padding:.2rem .8rem;border-bottom:1px solid #e3e3e3;text-align:right}td:first-child,th:first-child{text-align:left}\
+td,th{padding:.2rem .8rem;border-bottom:1px solid #e3e3e3;text-align:right}td:first-child,th:first-child,.text{text-align:left}\
 figure{margin:1rem 0}figcaption{color:#555;font-size:.9rem}svg,img{max-width:100%;height:auto}";
+
+/// Whether a cell holds a number, with or without a unit, or stands for one.
+fn is_number(cell: &str) -> bool {
+    let cell = cell.trim().trim_start_matches(['-', '+', '−', '±', ' ']);
+    cell.is_empty() || cell == "none" || cell.starts_with(|c: char| c.is_ascii_digit())
+}
 
 impl Page {
     /// An empty page.
@@ -30,6 +36,34 @@ impl Page {
         self
     }
 
+    /// A heading that [`Self::contents`] leads to.
+    pub fn anchored_heading(&mut self, anchor: &str, text: &str) -> &mut Self {
+        let _ = writeln!(self.body, "<h2 id=\"{}\">{}</h2>", escaped(anchor), escaped(text));
+        self
+    }
+
+    /// A list of links to anchored headings: anchors and texts.
+    pub fn contents(&mut self, headings: &[(String, String)]) -> &mut Self {
+        self.body.push_str("<nav><ul>\n");
+        for (anchor, text) in headings {
+            let _ = writeln!(self.body, "<li><a href=\"#{}\">{}</a></li>", escaped(anchor), escaped(text));
+        }
+        self.body.push_str("</ul></nav>\n");
+        self
+    }
+
+    /// What another page's [`Self::into_body`] has given.
+    pub fn append(&mut self, body: &str) -> &mut Self {
+        self.body.push_str(body);
+        self
+    }
+
+    /// Everything below the title, as HTML.
+    #[must_use]
+    pub fn into_body(self) -> String {
+        self.body
+    }
+
     /// A paragraph.
     pub fn paragraph(&mut self, text: &str) -> &mut Self {
         let _ = writeln!(self.body, "<p>{}</p>", escaped(text));
@@ -38,15 +72,18 @@ impl Page {
 
     /// A table; the first column holds names.
     pub fn table<R: AsRef<[String]>>(&mut self, header: &[&str], rows: &[R]) -> &mut Self {
+        // Words read from the left, numbers line up on the right.
+        let is_words = |column: usize| rows.iter().filter_map(|row| row.as_ref().get(column)).any(|cell| !is_number(cell));
+        let classes: Vec<&str> = (0..header.len()).map(|i| if is_words(i) { " class=\"text\"" } else { "" }).collect();
         self.body.push_str("<table><tr>");
-        for name in header {
-            let _ = write!(self.body, "<th>{}</th>", escaped(name));
+        for (name, class) in header.iter().zip(&classes) {
+            let _ = write!(self.body, "<th{class}>{}</th>", escaped(name));
         }
         self.body.push_str("</tr>\n");
         for row in rows {
             self.body.push_str("<tr>");
-            for cell in row.as_ref() {
-                let _ = write!(self.body, "<td>{}</td>", escaped(cell));
+            for (i, cell) in row.as_ref().iter().enumerate() {
+                let _ = write!(self.body, "<td{}>{}</td>", classes.get(i).unwrap_or(&""), escaped(cell));
             }
             self.body.push_str("</tr>\n");
         }
@@ -60,13 +97,14 @@ impl Page {
         self
     }
 
-    /// A picture (PNG) with what it shows; it travels inside the page.
-    pub fn picture(&mut self, png: &[u8], caption: &str) -> &mut Self {
-        let data = BASE64_STANDARD.encode(png);
+    /// A picture (PNG or JPEG) with what it shows; it travels inside the page.
+    pub fn picture(&mut self, picture: &[u8], caption: &str) -> &mut Self {
+        let kind = if picture.starts_with(&[0xff, 0xd8]) { "jpeg" } else { "png" };
+        let data = BASE64_STANDARD.encode(picture);
         let caption = escaped(caption);
         let _ = writeln!(
             self.body,
-            "<figure><img alt=\"{caption}\" src=\"data:image/png;base64,{data}\"><figcaption>{caption}</figcaption></figure>"
+            "<figure><img alt=\"{caption}\" src=\"data:image/{kind};base64,{data}\"><figcaption>{caption}</figcaption></figure>"
         );
         self
     }

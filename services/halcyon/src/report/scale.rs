@@ -51,6 +51,20 @@ pub(super) fn label(value: f64) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
 }
 
+/// A number for an axis that spans `span`: enough digits that neighbouring ticks differ.
+pub(super) fn label_in(value: f64, span: f64) -> String {
+    let plain = label(value);
+    let is_small = value.abs() < 1e-3 * span;
+    // Ticks are a tenth of the span apart, or a twentieth.
+    let decimals = (1.4 - span.log10()).ceil();
+    if is_small || !(1e-3..1e5).contains(&value.abs()) || !(1.0..=9.0).contains(&decimals) {
+        return plain;
+    }
+    let text = format!("{value:.0$}", decimals as usize);
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text.len() > plain.len() { text.into() } else { plain }
+}
+
 /// Viridis by a polynomial fit to its published table, `share` 0 to 1: dark is low, and equal steps look equal.
 pub(super) fn viridis(share: f64) -> RGBColor {
     let t = share.clamp(0.0, 1.0);
@@ -92,6 +106,15 @@ mod tests {
         ] {
             assert_eq!(label(value), text);
         }
+    }
+
+    #[test]
+    fn neighbouring_ticks_differ_however_narrow_the_axis() {
+        for (low, span) in [(0.4998, 0.0004), (0.5, 2e-6), (12.0, 0.01), (-1.0, 2.0), (0.0, 1e-5), (99_000.0, 500.0)] {
+            let labels: Vec<String> = (0..=10).map(|i| label_in(low + f64::from(i) * 0.1 * span, span)).collect();
+            assert!(labels.windows(2).all(|pair| pair[0] != pair[1]), "{labels:?}");
+        }
+        assert_eq!(label_in(0.25, 1.0), "0.25");
     }
 
     /// The ends and the middle of matplotlib's table.

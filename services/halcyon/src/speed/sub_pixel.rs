@@ -123,7 +123,7 @@ pub(super) fn run(shifts: u32) -> Result<Vec<SubPixelRow>, BenchError> {
             let mut matcher = engine.matcher(engine.block_px_default());
             let disparity = match_images(matcher.as_mut(), &left, &right, DisparityRange { min_px: 0, max_px: 47 })?;
             plain.add(&disparity, shift_px);
-            fine.add(&refined(&left, &right, disparity)?, shift_px);
+            fine.add(&refined(&left, &right, &disparity)?, shift_px);
         }
     }
     let rows = Engine::ALL.into_iter().zip(&errors);

@@ -21,7 +21,7 @@ const WAVES_MAX: f64 = 1e12;
 ///
 /// Successive waves of a narrow band come in groups and are not quite independent: that makes the truth a little lower.
 #[must_use]
-pub fn highest(model: &impl Exceedance, waves: f64) -> Extreme {
+pub fn highest(model: &(impl Exceedance + ?Sized), waves: f64) -> Extreme {
     let n = if waves.is_nan() { WAVES_MAX } else { waves.clamp(1.0, WAVES_MAX) };
     // Without cancellation for small P; P = 1 gives ln 0 and so 1.
     Extreme::of(&|x| -(n * (-model.exceedance(x)).ln_1p()).exp_m1())

@@ -34,7 +34,7 @@ pub struct Comparison {
 /// Compares those of `values_m` that are above `from_m` with `model`, given that they are above it. Asymptotic theories (Boccotti's) only hold
 /// for high waves: give them a threshold; 0 compares all positive ones. `None` with fewer than five values.
 #[must_use]
-pub fn compare(values_m: &[f64], model: &impl Exceedance, from_m: f64) -> Option<Comparison> {
+pub fn compare(values_m: &[f64], model: &(impl Exceedance + ?Sized), from_m: f64) -> Option<Comparison> {
     const VALUES_MIN: usize = 5;
     let from_m = from_m.max(0.0);
     let mut values: Vec<f64> = values_m.iter().copied().filter(|x| x.is_finite() && *x > from_m).collect();
@@ -87,7 +87,7 @@ mod tests {
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
-    fn drawn(model: &impl Exceedance, n: usize, seed: u64) -> Vec<f64> {
+    fn drawn(model: &(impl Exceedance + ?Sized), n: usize, seed: u64) -> Vec<f64> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         (0..n).map(|_| model.exceeded_m(random.random_range(1e-12..1.0))).collect()
     }

@@ -132,7 +132,7 @@ pub(super) mod tests {
             [(1.3, 2.0, Flag::Fail), (3.0, 2.0, Flag::Pass), (1.3, 10.0, Flag::Pass), (1.0, 4.0, Flag::Suspect)]
         {
             let record = sea(0.3, t_p_s, rate_hz, 4096);
-            let spectrum = Welch { segment_samples: 256 }.spectrum(&record).unwrap();
+            let spectrum = Welch::new(256).spectrum(&record).unwrap();
             let truth = Jonswap::new(0.3, t_p_s, 3.3).unwrap().moment(0, 0.5 * rate_hz, 100.0) / (0.3f64.powi(2) / 16.0);
             let found = Nyquist::of(&spectrum, 4.0).unwrap();
             // A tail of f⁻⁵ holds a quarter less than the f⁻⁴ assumed; near the peak it is not a tail at all.
@@ -148,7 +148,7 @@ pub(super) mod tests {
         let mut random = ChaCha8Rng::seed_from_u64(5);
         let mut noise = |sigma_m: f64| {
             let samples: Vec<f64> = (0..4096).map(|_| sigma_m * random.sample::<f64, _>(rand_distr::StandardNormal)).collect();
-            Welch { segment_samples: 256 }.spectrum(&Record::new(samples, 5.0).unwrap()).unwrap()
+            Welch::new(256).spectrum(&Record::new(samples, 5.0).unwrap()).unwrap()
         };
         assert_eq!(sampling_rate(&noise(0.001), &SamplingLimits::default()).flag, Flag::Pass);
         // White noise of a tenth of a metre: nothing falls, and it is as high as waves.

@@ -137,7 +137,7 @@ mod tests {
     fn sines(waves: &[(f64, f64)]) -> SampledSpectrum {
         let at = |i: usize| waves.iter().map(|(a, f)| a * (TAU * f * i as f64 / 10.0).sin()).sum::<f64>();
         let record = Record::new((0..8000).map(at).collect::<Vec<_>>(), 10.0).unwrap();
-        Welch { segment_samples: 2000 }.spectrum(&record).unwrap()
+        Welch::new(2000).spectrum(&record).unwrap()
     }
 
     fn flags(spectrum: &SampledSpectrum) -> [Flag; 3] {
@@ -163,7 +163,7 @@ mod tests {
 
     #[test]
     fn an_ordinary_sea_passes() {
-        let spectrum = Welch { segment_samples: 1024 }.spectrum(&sea(0.3, 2.5, 10.0, 8192)).unwrap();
+        let spectrum = Welch::new(1024).spectrum(&sea(0.3, 2.5, 10.0, 8192)).unwrap();
         assert_eq!(flags(&spectrum), [Flag::Pass; 3]);
     }
 

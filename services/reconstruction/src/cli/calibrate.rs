@@ -1,11 +1,14 @@
 //! `halcyon calibrate`
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use halcyon_model::{Image, RigCalibration};
 
+use super::limits::{OutOfRange, within};
 use crate::core::calibrate::{BoardSpec, CalibrateError, Calibration, Options, calibrate_with, camera_infos};
-use crate::files::{FileError, GlobError, RigFileError, glob, read_pair, read_rig, write_rig, write_ros};
+use crate::files::{
+    FileError, GlobError, Output, RigFileError, check_outputs, glob, read_pair, read_rig, rig_files, write_rig, write_ros,
+};
 
 mod report;
 
@@ -17,6 +20,9 @@ pub enum CalibrateCliError {
     /// `--board` is not two numbers.
     #[error("a board is given as COLSxROWS inner corners, such as 9x6, not {0:?}")]
     Board(String),
+    /// A number out of range.
+    #[error(transparent)]
+    Range(#[from] OutOfRange),
     /// A pattern without files.
     #[error(transparent)]
     Glob(#[from] GlobError),
@@ -58,6 +64,32 @@ pub struct CalibrateRequest<'a> {
     pub ros: Option<&'a Path>,
 }
 
+impl CalibrateRequest<'_> {
+    /// Checks numbers, pictures' names and outputs before any work, with a `report` that somebody else will write. Gives the board, and
+    /// the pictures of both sides.
+    ///
+    /// # Errors
+    /// [`CalibrateCliError`]: one line that names the option.
+    pub fn check(&self, report: Option<&Path>) -> Result<(BoardSpec, [Vec<PathBuf>; 2]), CalibrateCliError> {
+        let board = parse_board(self.board, self.square_m)?;
+        within("--distance", self.options.depth_at_m, 1e-3, 1e4, " m")?;
+        let (left, right) = (glob(self.left)?, glob(self.right)?);
+        if left.len() != right.len() {
+            return Err(CalibrateCliError::Unpaired { left: left.len(), right: right.len() });
+        }
+        let inputs = left.iter().map(|path| ("--left", path)).chain(right.iter().map(|path| ("--right", path)));
+        let page = report.map(|path| Output::file("--report", path, &["html", "htm"]));
+        let outputs: Vec<Output> = outputs(self.out, self.ros).into_iter().chain(page).collect();
+        check_outputs(inputs.map(|(option, path)| (option, path.as_path())), &outputs).map_err(FileError::from)?;
+        Ok((board, [left, right]))
+    }
+}
+
+fn outputs(out: Option<&Path>, ros: Option<&Path>) -> Vec<Output> {
+    let out = out.map(|path| Output::file("--out", path, &["yaml", "yml"]));
+    out.into_iter().chain(ros.into_iter().flat_map(|folder| Output::ros("--ros", folder))).collect()
+}
+
 /// Calibrates from the pictures that two patterns name, and writes the outputs asked for. Gives what `--json` prints, and all
 /// there is to draw.
 ///
@@ -69,11 +101,7 @@ pub fn calibrate(
     request: &CalibrateRequest<'_>,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<(CalibrateReport, Calibration), CalibrateCliError> {
-    let board = parse_board(request.board, request.square_m)?;
-    let (left, right) = (glob(request.left)?, glob(request.right)?);
-    if left.len() != right.len() {
-        return Err(CalibrateCliError::Unpaired { left: left.len(), right: right.len() });
-    }
+    let (board, [left, right]) = request.check(None)?;
     let views: Vec<(Image, Image)> =
         left.iter().zip(&right).map(|(left, right)| read_pair(left, right)).collect::<Result<_, FileError>>()?;
     let calibration = calibrate_with(&views, board, &request.options, progress)?;
@@ -87,6 +115,9 @@ pub fn calibrate(
 /// # Errors
 /// [`CalibrateCliError`]: one line that says which file, line and key is at fault.
 pub fn convert_rig(from: &Path, out: Option<&Path>, ros: Option<&Path>) -> Result<RigCalibration, CalibrateCliError> {
+    let files = rig_files(from);
+    let inputs = files.iter().map(|path| ("--from", path.as_path()));
+    check_outputs(inputs, &outputs(out, ros)).map_err(FileError::from)?;
     let rig = read_rig(from)?;
     write(&rig, out, ros)?;
     Ok(rig)
@@ -106,8 +137,19 @@ fn parse_board(text: &str, square_m: f64) -> Result<BoardSpec, CalibrateCliError
     let sides =
         text.split_once(['x', 'X', '×']).and_then(|(cols, rows)| Some((cols.trim().parse().ok()?, rows.trim().parse().ok()?)));
     let (cols, rows) = sides.ok_or_else(|| CalibrateCliError::Board(text.chars().take(40).collect()))?;
+    // The core takes what is geometrically possible; nobody carries a board of squares this large.
+    let hint = if (1.0..=1000.0).contains(&square_m) {
+        format!(": --square is in metres, and {square_m} mm are {} m", square_m / 1e3)
+    } else {
+        String::new()
+    };
+    within("--square", square_m, SQUARE_M_MIN, SQUARE_M_MAX, " m").map_err(|error| error.with_hint(hint))?;
     Ok(BoardSpec::new(cols, rows, square_m)?)
 }
+
+/// Sides of a square that a board can have, metres: a stage micrometer, and a wall.
+const SQUARE_M_MIN: f64 = 1e-4;
+const SQUARE_M_MAX: f64 = 1.0;
 
 #[cfg(test)]
 mod tests {
@@ -118,6 +160,12 @@ mod tests {
         assert!(parse_board("9x6", 0.03).is_ok());
         for bad in ["", "9", "9x", "x6", "9x6x1", "-9x6", "9.5x6", "9 by 6"] {
             assert!(matches!(parse_board(bad, 0.03), Err(CalibrateCliError::Board(_))), "{bad}");
+        }
+        for (square_m, hint) in
+            [(25.0, "25 mm are 0.025 m"), (f64::NAN, "0.0001 to 1 m"), (0.0, "to 1 m"), (-1.0, "to 1 m"), (1e9, "to 1 m")]
+        {
+            let error = parse_board("9x6", square_m).unwrap_err().to_string();
+            assert!(error.starts_with("--square must be") && error.contains(hint), "{error}");
         }
         assert!(matches!(parse_board("1x1", 0.03), Err(CalibrateCliError::Calibrate(CalibrateError::Board { .. }))));
     }

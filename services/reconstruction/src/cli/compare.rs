@@ -11,7 +11,7 @@ use crate::core::disparity::Disparity;
 use crate::core::disparity::score::{Score, SizeError, score};
 use crate::core::matcher::{DisparityRange, Engine, MatchError, match_images};
 use crate::core::reconstruct::{REFINE_ROUNDS, Settings};
-use crate::core::refine::Refiner;
+use crate::core::refine::{Every, Refined, Refiner};
 
 /// What one engine made of a pair.
 #[derive(Debug, Clone, PartialEq)]
@@ -133,13 +133,14 @@ fn resized(image: &Image, width_px: u32, height_px: u32) -> Result<Image, MatchE
 ///
 /// # Errors
 /// [`MatchError`] where pictures and disparity differ in size.
-pub fn refined(left: &Image, right: &Image, mut disparity: Disparity) -> Result<Disparity, MatchError> {
+pub fn refined(left: &Image, right: &Image, disparity: &Disparity) -> Result<Disparity, MatchError> {
     let exact = |image: &Image| -> opencv::Result<Mat> {
         let mut exact = Mat::default();
         cv::mat_from_image(image)?.convert_to(&mut exact, opencv::core::CV_32F, 1.0, 0.0)?;
         Ok(exact)
     };
-    let mut refiner = Refiner::new(Settings::default().refine_window_px, REFINE_ROUNDS);
-    refiner.refine(&exact(left)?, &exact(right)?, &mut disparity, &mut Vec::new())?;
-    Ok(disparity)
+    let mut refiner = Refiner::new(Settings::default().refine_window_px, REFINE_ROUNDS, Every::Pixel);
+    let mut refined = Refined::default();
+    refiner.refine(&exact(left)?, &exact(right)?, disparity, &mut refined)?;
+    Ok(refined.disparity)
 }

@@ -7,6 +7,7 @@ use halcyon_model::{Image, RigCalibration};
 use nalgebra::{Matrix3, Matrix3x4, Vector3};
 use serde::Serialize;
 
+use super::limits::{OutOfRange, within};
 use crate::core::epipolar::{
     PointPair, RansacSettings, Rays, essential_from_fundamental, essential_from_pose, pixels_without_distortion,
     pose_from_essential, projection_matrices, triangulate,
@@ -14,7 +15,7 @@ use crate::core::epipolar::{
 use crate::core::features::{
     FeatureError, FeatureStudy, KEYPOINTS_MAX, MatchRule, Method, StudySettings, UnknownMethod, encode_png, study,
 };
-use crate::files::{FileError, RigFileError, read_picture, read_rig, write_bytes};
+use crate::files::{FileError, Output, RigFileError, check_outputs, read_picture, read_rig, rig_files, write_bytes};
 
 /// Why there are no features.
 #[derive(Debug, thiserror::Error)]
@@ -23,17 +24,8 @@ pub enum FeaturesCliError {
     #[error(transparent)]
     Method(#[from] UnknownMethod),
     /// A number out of range.
-    #[error("{name} must be {low} to {high}, not {value}")]
-    Range {
-        /// The option.
-        name: &'static str,
-        /// What was given.
-        value: f64,
-        /// At least.
-        low: f64,
-        /// At most.
-        high: f64,
-    },
+    #[error(transparent)]
+    Range(#[from] OutOfRange),
     /// `--cloud` needs `--rig`.
     #[error("a cloud needs the rig that took the pictures: --rig")]
     CloudWithoutRig,
@@ -143,6 +135,17 @@ pub struct FeaturesReport {
     pub rows: Vec<FeatureRow>,
     /// What was written.
     pub files: Vec<PathBuf>,
+    /// Clouds that were asked for and do not exist, and why.
+    pub missing: Vec<MissingCloud>,
+}
+
+/// A cloud that could not be made.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MissingCloud {
+    /// Where it should be.
+    pub path: PathBuf,
+    /// Why it is not.
+    pub why: &'static str,
 }
 
 /// Finds, matches and filters the features of a pair. With `all` methods each writes its own files, its name put before the ending.
@@ -158,15 +161,15 @@ pub fn features(options: &FeaturesOptions<'_>) -> Result<FeaturesReport, Feature
     if options.cloud.is_some() && options.rig.is_none() {
         return Err(FeaturesCliError::CloudWithoutRig);
     }
-    check_extension(options.out, "png", ".png")?;
-    check_extension(options.cloud, "ply", ".ply")?;
+    let own_path = |path: &Path, method: Method| if methods.len() > 1 { with_method(path, method) } else { path.into() };
+    check_files(options, &methods, &own_path)?;
     let rig = options.rig.map(read_rig).transpose()?;
     let (left, right) = (read_picture(options.left)?, read_picture(options.right)?);
     if let Some(rig) = &rig {
         check_size(options.left, &left, rig)?;
         check_size(options.right, &right, rig)?;
     }
-    let (mut rows, mut files) = (Vec::new(), Vec::new());
+    let (mut rows, mut files, mut missing) = (Vec::new(), Vec::new(), Vec::new());
     for method in &methods {
         let place = |pairs: &[PointPair]| match &rig {
             // OpenCV's failure here is want of memory: then the pixels as they are must do.
@@ -175,16 +178,20 @@ pub fn features(options: &FeaturesOptions<'_>) -> Result<FeaturesReport, Feature
         };
         let study = study(&left, &right, *method, &settings, &place)?;
         let (pose, points) = rig.as_ref().map(|rig| pose(&study, rig)).transpose()?.flatten().unzip();
-        let own_path = |path: &Path| if methods.len() > 1 { with_method(path, *method) } else { path.into() };
         if let Some(out) = options.out {
-            let path = own_path(out);
+            let path = own_path(out, *method);
             write_bytes(&path, &encode_png(&left, &right, &study)?)?;
             files.push(path);
         }
-        if let (Some(cloud), Some(points)) = (options.cloud, points) {
-            let path = own_path(cloud);
-            write_bytes(&path, ply(&points).as_bytes())?;
-            files.push(path);
+        if let Some(cloud) = options.cloud {
+            let path = own_path(cloud, *method);
+            match points {
+                Some(points) if !points.is_empty() => {
+                    write_bytes(&path, ply(&points).as_bytes())?;
+                    files.push(path);
+                }
+                points => missing.push(MissingCloud { path, why: why_missing(&study, points.is_some()) }),
+            }
         }
         let counts = study.counts();
         rows.push(FeatureRow {
@@ -198,16 +205,37 @@ pub fn features(options: &FeaturesOptions<'_>) -> Result<FeaturesReport, Feature
             pose,
         });
     }
-    Ok(FeaturesReport { width_px: left.width_px(), height_px: left.height_px(), rows, files })
+    Ok(FeaturesReport { width_px: left.width_px(), height_px: left.height_px(), rows, files, missing })
 }
 
-fn settings(options: &FeaturesOptions<'_>) -> Result<StudySettings, FeaturesCliError> {
-    let within = |name, value: f64, low: f64, high: f64| {
-        if (low..=high).contains(&value) { Ok(()) } else { Err(FeaturesCliError::Range { name, value, low, high }) }
-    };
-    within("RANSAC's threshold", options.ransac_px, 0.01, 100.0)?;
-    within("the ratio", options.ratio_max, 0.1, 1.0)?;
-    within("the number of keypoints", options.keypoints_max as f64, 1.0, KEYPOINTS_MAX as f64)?;
+/// Every file that will be written, before the work: one for each method.
+fn check_files(
+    options: &FeaturesOptions<'_>,
+    methods: &[Method],
+    own_path: &dyn Fn(&Path, Method) -> PathBuf,
+) -> Result<(), FileError> {
+    let rig = options.rig.map(rig_files).unwrap_or_default();
+    let inputs = [("--left", options.left), ("--right", options.right)];
+    let inputs = inputs.into_iter().chain(rig.iter().map(|path| ("--rig", path.as_path())));
+    let pictures = options.out.into_iter().flat_map(|path| methods.iter().map(move |method| (path, *method)));
+    let clouds = options.cloud.into_iter().flat_map(|path| methods.iter().map(move |method| (path, *method)));
+    let pictures = pictures.map(|(path, method)| Output::file("--out", own_path(path, method), &["png"]));
+    let clouds = clouds.map(|(path, method)| Output::file("--cloud", own_path(path, method), &["ply"]));
+    Ok(check_outputs(inputs, &pictures.chain(clouds).collect::<Vec<_>>())?)
+}
+
+fn why_missing(study: &FeatureStudy, has_pose: bool) -> &'static str {
+    match (&study.consensus, has_pose) {
+        (None, _) => "no epipolar geometry that enough matches agree on",
+        (Some(_), false) => "no pose puts enough points in front of both cameras",
+        (Some(_), true) => "no match could be triangulated in front of both cameras",
+    }
+}
+
+fn settings(options: &FeaturesOptions<'_>) -> Result<StudySettings, OutOfRange> {
+    within("--ransac-px", options.ransac_px, 0.01, 100.0, " px")?;
+    within("--ratio", options.ratio_max, 0.1, 1.0, "")?;
+    within("--keypoints", options.keypoints_max as f64, 1.0, KEYPOINTS_MAX as f64, "")?;
     Ok(StudySettings {
         keypoints_max: options.keypoints_max,
         rule: MatchRule {
@@ -216,15 +244,6 @@ fn settings(options: &FeaturesOptions<'_>) -> Result<StudySettings, FeaturesCliE
         },
         ransac: RansacSettings { threshold_px: options.ransac_px, ..RansacSettings::default() },
     })
-}
-
-fn check_extension(path: Option<&Path>, wanted: &str, expected: &'static str) -> Result<(), FileError> {
-    match path {
-        Some(path) if !path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(wanted)) => {
-            Err(FileError::Extension { path: path.into(), expected })
-        }
-        _ => Ok(()),
-    }
 }
 
 fn check_size(path: &Path, image: &Image, rig: &RigCalibration) -> Result<(), FeaturesCliError> {

@@ -2,15 +2,18 @@
 
 use std::path::Path;
 
+use halcyon_model::Image;
 use serde::Serialize;
 
+use super::limits::{OutOfRange, within};
 use super::options::{MatchOptions, OptionError};
 use super::speed::{Spent, spent};
+use super::texture::without_texture;
 use crate::core::disparity::Disparity;
 use crate::core::disparity::score::{Score, SizeError, score};
 use crate::core::disparity::{colour, pfm};
 use crate::core::matcher::{DisparityRange, Engine, MatchError, UnknownEngine, match_images};
-use crate::files::{FileError, read_pair, read_truth, write_bytes};
+use crate::files::{FileError, Output, check_outputs, has_ending, read_pair, read_truth, write_bytes};
 
 /// Why there is no disparity map.
 #[derive(Debug, thiserror::Error)]
@@ -21,8 +24,11 @@ pub enum MatchCliError {
     /// Another option.
     #[error(transparent)]
     Option(#[from] OptionError),
-    /// `--max-disparity`
-    #[error("the largest disparity must be at least 1 and below the pictures' width, {width_px} px, not {max_disparity_px}")]
+    /// `--max-disparity`, of any picture.
+    #[error(transparent)]
+    Range(#[from] OutOfRange),
+    /// `--max-disparity`, of these pictures.
+    #[error("--max-disparity must be below the pictures' width, {width_px} px, not {max_disparity_px} px")]
     MaxDisparity {
         /// What was asked for.
         max_disparity_px: f64,
@@ -49,7 +55,7 @@ pub struct MatchReport {
     pub width_px: u32,
     /// Height, pixels.
     pub height_px: u32,
-    /// Disparities searched, after rounding up to what the engine takes.
+    /// Disparities searched, after rounding up to what the engine takes; matches beyond what was asked for are dropped.
     pub disparities: u32,
     /// Side of the window, pixels.
     pub window_px: u32,
@@ -64,6 +70,8 @@ pub struct MatchReport {
     /// The comparison with the truth, where one was given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub truth: Option<TruthReport>,
+    /// What makes the result doubtful; mostly empty.
+    pub warnings: Vec<String>,
 }
 
 /// A disparity map against its truth, as `--json` prints it; shares are 0 to 1, and null where nothing was matched.
@@ -103,16 +111,15 @@ pub fn match_pair(
 ) -> Result<MatchReport, MatchCliError> {
     let engine: Engine = engine.parse()?;
     let mut matcher = options.matcher(engine)?;
-    let extension = out.extension().map(std::ffi::OsStr::to_ascii_lowercase);
-    let as_png = match extension.as_deref().and_then(std::ffi::OsStr::to_str) {
-        Some("pfm") => false,
-        Some("png") => true,
-        _ => return Err(FileError::Extension { path: out.into(), expected: ".pfm or .png" }.into()),
-    };
+    within("--max-disparity", max_disparity_px, 1.0, f64::from(Image::SIDE_PX_MAX), " px")?;
+    let inputs = [("--left", Some(left)), ("--right", Some(right)), ("--truth", options.truth.as_deref())];
+    let inputs = inputs.into_iter().filter_map(|(option, path)| Some((option, path?)));
+    check_outputs(inputs, &[Output::file("--out", out, &["pfm", "png"])]).map_err(FileError::from)?;
+    let as_png = has_ending(out, &["png"]);
+    let paths = [left, right];
     let (left, right) = read_pair(left, right)?;
     let width_px = left.width_px();
-    // Negated so that NaN is refused, too.
-    if !(max_disparity_px >= 1.0 && max_disparity_px < f64::from(width_px)) {
+    if max_disparity_px >= f64::from(width_px) {
         return Err(MatchCliError::MaxDisparity { max_disparity_px, width_px });
     }
     let truth = options.truth.as_deref().map(|path| read_truth(path, options.truth_scale_px)).transpose()?;
@@ -125,7 +132,13 @@ pub fn match_pair(
     // Rounded up where the sum is no multiple of 16; still below the width, which the check above leaves room for.
     let range = DisparityRange { min_px: 0, max_px: (max_disparity_px.ceil() as u32).min(width_px - 1) };
     let (disparity, Spent { cpu_ms, wall_ms }) = spent(|| match_images(matcher.as_mut(), &left, &right, range));
-    let disparity = disparity?;
+    let mut disparity = disparity?;
+    keep_up_to(&mut disparity, max_disparity_px);
+    let mut warnings = Vec::new();
+    if let Some(blank) = without_texture([(paths[0], &left), (paths[1], &right)]) {
+        disparity.reset(width_px, left.height_px());
+        warnings.push(format!("no texture in {}: there is nothing to match", blank.display()));
+    }
     let truth = truth.map(|truth| score(&disparity, &truth)).transpose()?.map(TruthReport::from);
     let bytes = if as_png { colour::encode_png(&disparity).map_err(MatchError::from)? } else { pfm::encode(&disparity) };
     write_bytes(out, &bytes)?;
@@ -140,5 +153,13 @@ pub fn match_pair(
         cpu_ms,
         wall_ms,
         truth,
+        warnings,
     })
+}
+
+/// Drops what an engine found beyond the range that was asked for: OpenCV's search multiples of 16.
+fn keep_up_to(disparity: &mut Disparity, max_px: f64) {
+    for value in disparity.values_px.iter_mut().filter(|value| f64::from(**value) > max_px) {
+        *value = f32::NAN;
+    }
 }

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use crate::core::matcher::{Engine, Matcher};
+use crate::core::study::cost::Cost;
 use crate::core::study::path::Paths;
 use crate::core::study::window::Windows;
 use crate::core::study::{Optimiser, ReferenceMatcher, Settings};
@@ -59,12 +60,12 @@ impl Default for MatchOptions {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum OptionError {
     /// Only other engines have it.
-    #[error("{option} is for engines that start with {prefixes}, not for {engine}")]
+    #[error("{option} is for engines that {engines}, not for {engine}")]
     Engine {
         /// The option.
         option: &'static str,
-        /// Which engines have it.
-        prefixes: &'static str,
+        /// Which engines have it, after "that".
+        engines: &'static str,
         /// The one that was asked for.
         engine: &'static str,
     },
@@ -87,7 +88,10 @@ impl MatchOptions {
     pub fn matcher(&self, engine: Engine) -> Result<Box<dyn Matcher>, OptionError> {
         // Negated so that NaN is refused, too.
         if !(self.truth_scale_px > 0.0 && self.truth_scale_px.is_finite()) {
-            return Err(OptionError::Value(format!("the truth's scale must be above 0, not {}", self.truth_scale_px)));
+            return Err(OptionError::Value(format!(
+                "--truth-scale must be above 0 px for a grey level, not {}",
+                self.truth_scale_px
+            )));
         }
         let study = [
             ("--windows", self.windows.is_some()),
@@ -103,22 +107,25 @@ impl MatchOptions {
             ("--adaptive-p2", self.adaptive_p2),
         ];
         let set = |options: &[(&'static str, bool)]| options.iter().find(|(_, is_set)| *is_set).map(|(option, _)| *option);
-        let refuse = |option, prefixes| Err(OptionError::Engine { option, prefixes, engine: engine.name() });
+        let refuse = |option, engines| Err(OptionError::Engine { option, engines, engine: engine.name() });
         let Engine::Study(method) = engine else {
             if let Some(option) = set(&study) {
-                return refuse(option, "wta- or sgm-");
+                return refuse(option, "start with wta- or sgm-");
             }
             if let Some(option) = set(&semi_global) {
-                return refuse(option, "sgm-");
+                return refuse(option, "start with sgm-");
             }
             let (window_px, least) = (self.window_px(engine), if engine == Engine::Bm { 5 } else { 1 });
             if window_px % 2 == 0 || !(least..=51).contains(&window_px) {
-                return Err(OptionError::Value(format!("the window must be odd, {least} to 51, not {window_px}")));
+                return Err(OptionError::Value(format!("--window must be odd, {least} to 51 px, not {window_px} px")));
             }
             return Ok(engine.matcher(window_px));
         };
         if let (false, Some(option)) = (method.semi_global, set(&semi_global)) {
-            return refuse(option, "sgm-");
+            return refuse(option, "start with sgm-");
+        }
+        if self.transform_px.is_some() && !matches!(method.cost, Cost::Rank | Cost::Census) {
+            return refuse("--transform", "end in -rank or -census");
         }
         let settings = self.settings(Settings::new(method, self.window_px(engine)))?;
         settings.check().map_err(OptionError::Value)?;
@@ -169,7 +176,17 @@ mod tests {
             ("sgbm", MatchOptions { paths: Some(8), ..default() }, "--paths is for engines that start with sgm-"),
             ("bm", MatchOptions { windows: Some(9), ..default() }, "--windows is for engines that start with wta- or sgm-"),
             ("wta-sad", MatchOptions { p1: Some(1.0), ..default() }, "--p1 is for engines that start with sgm-"),
-            ("bm", MatchOptions { window_px: Some(3), ..default() }, "5 to 51, not 3"),
+            (
+                "wta-sad",
+                MatchOptions { transform_px: Some(5), ..default() },
+                "--transform is for engines that end in -rank or -census",
+            ),
+            (
+                "sgm-mi",
+                MatchOptions { transform_px: Some(5), ..default() },
+                "--transform is for engines that end in -rank or -census",
+            ),
+            ("bm", MatchOptions { window_px: Some(3), ..default() }, "5 to 51 px, not 3 px"),
             ("sgbm", MatchOptions { window_px: Some(4), ..default() }, "odd"),
             ("wta-sad", MatchOptions { window_px: Some(53), ..default() }, "1 to 51, not 53"),
             ("wta-ncc", MatchOptions { window_px: Some(1), ..default() }, "3 to 51, not 1"),

@@ -4,10 +4,18 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
+use super::limits::{OutOfRange, within};
 use crate::core::reconstruct::Settings;
 use crate::core::rectify::{Rectifier, RectifyError};
 use crate::core::rig_budget::{Best, Budget, LENGTH_PER_HEIGHT, RigGeometry, RigGeometryError};
 use crate::files::{RigFileError, read_rig};
+
+/// The highest wave that was ever measured is about 30 m.
+const WAVE_HEIGHT_M: [f64; 2] = [1e-4, 40.0];
+/// Longer ones are tsunamis and tides.
+const WAVELENGTH_M: [f64; 2] = [1e-3, 2000.0];
+/// Steeper waves break: height over length in deep water (Michell 1893).
+const STEEPNESS_MAX: f64 = 0.142;
 
 /// Rows of the table.
 const ROWS: i32 = 24;
@@ -70,6 +78,20 @@ pub enum RigCliError {
         high_m: f64,
         /// The least that is possible, metres.
         least_m: f64,
+    },
+    /// Another number.
+    #[error(transparent)]
+    Range(#[from] OutOfRange),
+    /// A wave that would break.
+    #[error(
+        "a wave {height_m} m high and {length_m} m long breaks: height over length is {:.3}, at most {STEEPNESS_MAX} in deep water",
+        height_m / length_m
+    )]
+    Breaks {
+        /// `--wave-height`, metres.
+        height_m: f64,
+        /// `--wavelength`, metres.
+        length_m: f64,
     },
     /// `--altitudes`
     #[error("altitudes must be LOW..HIGH in metres, from 0.01 to 10000, not {text:?}")]
@@ -185,6 +207,7 @@ impl From<Best> for BestRow {
 /// # Errors
 /// [`RigCliError`]: one line that says which file or number is at fault.
 pub fn rig(options: &RigOptions) -> Result<RigReport, RigCliError> {
+    check_wave(options)?;
     let (low_m, high_m) = altitudes(&options.altitudes)?;
     let geometry = geometry(options)?;
     let altitude_m_min = geometry.altitude_m_min();
@@ -192,18 +215,13 @@ pub fn rig(options: &RigOptions) -> Result<RigReport, RigCliError> {
     if high_m / (high_m / low_m).powf(1.0 / f64::from(ROWS - 1)) < altitude_m_min {
         return Err(RigCliError::TooLow { high_m, least_m: altitude_m_min });
     }
-    for (name, value) in [("wave height", options.wave_height_m), ("wavelength", options.wavelength_m)] {
-        if let Some(value) = value
-            && !(1e-4..=1e3).contains(&value)
-        {
-            return Err(RigGeometryError { name, expected: "0.0001 to 1000 m", value }.into());
-        }
-    }
     let row = |i: i32| {
         let altitude_m = low_m * (high_m / low_m).powf(f64::from(i) / f64::from(ROWS - 1));
         BudgetRow::new(&geometry.at(altitude_m), altitude_m_min)
     };
-    let heights = options.wave_height_m.map_or(WAVES_M.to_vec(), |height_m| vec![height_m]);
+    let breaks = |height_m: f64| options.wavelength_m.is_some_and(|length_m| height_m > STEEPNESS_MAX * length_m);
+    let usual = || WAVES_M.into_iter().filter(|height_m| !breaks(*height_m)).collect();
+    let heights = options.wave_height_m.map_or_else(usual, |height_m| vec![height_m]);
     let length_m = |height_m: f64| options.wavelength_m.unwrap_or(height_m * LENGTH_PER_HEIGHT);
     Ok(RigReport {
         rig: RigNumbers {
@@ -221,6 +239,19 @@ pub fn rig(options: &RigOptions) -> Result<RigReport, RigCliError> {
     })
 }
 
+fn check_wave(options: &RigOptions) -> Result<(), RigCliError> {
+    let [low, high] = WAVE_HEIGHT_M;
+    options.wave_height_m.map_or(Ok(()), |height_m| within("--wave-height", height_m, low, high, " m"))?;
+    let [low, high] = WAVELENGTH_M;
+    options.wavelength_m.map_or(Ok(()), |length_m| within("--wavelength", length_m, low, high, " m"))?;
+    match (options.wave_height_m, options.wavelength_m) {
+        (Some(height_m), Some(length_m)) if height_m > STEEPNESS_MAX * length_m => {
+            Err(RigCliError::Breaks { height_m, length_m })
+        }
+        _ => Ok(()),
+    }
+}
+
 fn geometry(options: &RigOptions) -> Result<RigGeometry, RigCliError> {
     let (width_px, height_px, focal_px, baseline_m) = match &options.source {
         RigSource::File(path) => {
@@ -228,9 +259,7 @@ fn geometry(options: &RigOptions) -> Result<RigGeometry, RigCliError> {
             (rig.width_px, rig.height_px, rig.focal_px, rig.baseline_m)
         }
         RigSource::Plan { fov_deg, width_px, height_px, baseline_m } => {
-            if !(1.0..=170.0).contains(fov_deg) {
-                return Err(RigGeometryError { name: "field of view", expected: "1 to 170 degrees", value: *fov_deg }.into());
-            }
+            within("--fov-deg, the horizontal field of view,", *fov_deg, 1.0, 170.0, "°")?;
             (*width_px, *height_px, RigGeometry::focal_px(fov_deg.to_radians(), *width_px), *baseline_m)
         }
     };
@@ -300,7 +329,13 @@ mod tests {
         check(&|o| o.source = plan(50.0, 0, 0.4), "width");
         check(&|o| o.source = plan(50.0, 320, 0.0), "baseline");
         check(&|o| o.disparity_sigma_px = f64::NAN, "disparity sigma");
-        check(&|o| o.wave_height_m = Some(-1.0), "wave height");
-        check(&|o| o.wavelength_m = Some(0.0), "wavelength");
+        check(&|o| o.wave_height_m = Some(-1.0), "--wave-height must be 0.0001 to 40 m, not -1");
+        check(&|o| o.wave_height_m = Some(1000.0), "--wave-height must be 0.0001 to 40 m");
+        check(&|o| o.wavelength_m = Some(0.0), "--wavelength must be 0.001 to 2000 m");
+        let steep = |height_m| move |o: &mut RigOptions| (o.wave_height_m, o.wavelength_m) = (Some(height_m), Some(10.0));
+        check(&steep(1.43), "breaks: height over length is 0.143, at most 0.142");
+        let mut just = options();
+        steep(1.41)(&mut just);
+        assert!(rig(&just).is_ok());
     }
 }

@@ -4,9 +4,13 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+use super::limits::{OutOfRange, within};
+use crate::core::calibrate::SIGMAS_95;
 use crate::core::features::{FeatureError, MatchRule, Method, UnknownMethod, match_pictures};
 use crate::core::self_calibrate::{Scale, SelfCalibrateError, SelfCalibration, Settings, Solver, self_calibrate as calibrate};
-use crate::files::{FileError, GlobError, RigFileError, glob, read_picture, read_rig, write_bytes};
+use crate::files::{
+    FileError, GlobError, Output, RigFileError, check_outputs, glob, read_picture, read_rig, rig_files, write_rig,
+};
 
 /// Keypoints of each picture: enough to cover it, few enough to compare each with each.
 const KEYPOINTS_MAX: usize = 2000;
@@ -24,17 +28,8 @@ pub enum SelfCalibrateCliError {
     #[error("the scale comes from --baseline or from --altitude, not from both")]
     TwoScales,
     /// A number out of range.
-    #[error("{name} must be {low} to {high}, not {value}")]
-    Range {
-        /// The option.
-        name: &'static str,
-        /// What was given.
-        value: f64,
-        /// At least.
-        low: f64,
-        /// At most.
-        high: f64,
-    },
+    #[error(transparent)]
+    Range(#[from] OutOfRange),
     /// A pattern without files.
     #[error(transparent)]
     Glob(#[from] GlobError),
@@ -108,11 +103,16 @@ pub struct AngleReport {
     pub deg: f64,
     /// One standard deviation.
     pub sigma_deg: f64,
+    /// 95 % bound.
+    pub deg_low: f64,
+    /// 95 % bound.
+    pub deg_high: f64,
 }
 
 impl AngleReport {
     fn new(rad: f64, sigma_rad: f64) -> Self {
-        Self { deg: rad.to_degrees(), sigma_deg: sigma_rad.to_degrees() }
+        let (deg, sigma_deg) = (rad.to_degrees(), sigma_rad.to_degrees());
+        Self { deg, sigma_deg, deg_low: deg - SIGMAS_95 * sigma_deg, deg_high: deg + SIGMAS_95 * sigma_deg }
     }
 }
 
@@ -181,6 +181,8 @@ pub struct SelfCalibrateReport {
     pub is_flat: bool,
     /// For a flat scene: another pose that fits as well; the one nearer to the calibration in force was taken.
     pub alternative: Option<AlternativeReport>,
+    /// What makes the result doubtful; mostly empty.
+    pub warnings: Vec<String>,
 }
 
 /// Finds the pose of a rig's cameras from pairs without a board and writes the new calibration where asked to; `progress` is told
@@ -194,11 +196,17 @@ pub fn self_calibrate(
 ) -> Result<SelfCalibrateReport, SelfCalibrateCliError> {
     let method: Method = options.method.parse()?;
     let settings = settings(options)?;
-    let rig = read_rig(options.rig)?;
     let (left, right) = (glob(options.left)?, glob(options.right)?);
     if left.len() != right.len() {
         return Err(SelfCalibrateCliError::Unpaired { left: left.len(), right: right.len() });
     }
+    if let Some(out) = options.out {
+        let pictures = left.iter().map(|path| ("--left", path)).chain(right.iter().map(|path| ("--right", path)));
+        let files = rig_files(options.rig);
+        let inputs = pictures.chain(files.iter().map(|path| ("--rig", path))).map(|(option, path)| (option, path.as_path()));
+        check_outputs(inputs, &[Output::file("--out", out, &["yaml", "yml"])]).map_err(FileError::from)?;
+    }
+    let rig = read_rig(options.rig)?;
     let read = |path: &Path| {
         let image = read_picture(path)?;
         if (image.width_px(), image.height_px()) == (rig.width_px, rig.height_px) {
@@ -222,15 +230,13 @@ pub fn self_calibrate(
     }
     let found = calibrate(&rig, &matches, &settings)?;
     if let Some(out) = options.out {
-        write_bytes(out, halcyon_model::rig_yaml::write(&found.rig).as_bytes())?;
+        write_rig(out, &found.rig)?;
     }
-    Ok(report(method, views, &found))
+    let warnings = warnings(options, rig.baseline_m(), &found);
+    Ok(report(method, views, &found, warnings))
 }
 
 fn settings(options: &SelfCalibrateOptions<'_>) -> Result<Settings, SelfCalibrateCliError> {
-    let within = |name, value: f64, low: f64, high: f64| {
-        if (low..=high).contains(&value) { Ok(()) } else { Err(SelfCalibrateCliError::Range { name, value, low, high }) }
-    };
     let solver = match options.solver {
         "five" => Solver::FivePoint,
         "eight" => Solver::EightPoint,
@@ -239,17 +245,17 @@ fn settings(options: &SelfCalibrateOptions<'_>) -> Result<Settings, SelfCalibrat
     let scale = match (options.baseline_m, options.altitude_m) {
         (None, None) => Scale::Given,
         (Some(baseline_m), None) => {
-            within("the baseline", baseline_m, 1e-3, 100.0)?;
+            within("--baseline", baseline_m, 1e-3, 100.0, " m")?;
             Scale::Baseline(baseline_m)
         }
         (None, Some(altitude_m)) => {
-            within("the altitude", altitude_m, 1e-2, 10_000.0)?;
+            within("--altitude", altitude_m, 1e-2, 10_000.0, " m")?;
             Scale::Altitude(altitude_m)
         }
         (Some(_), Some(_)) => return Err(SelfCalibrateCliError::TwoScales),
     };
-    within("RANSAC's threshold", options.ransac_px, 0.01, 100.0)?;
-    within("the row error", options.drift_px_max, 0.0, 1000.0)?;
+    within("--ransac-px", options.ransac_px, 0.01, 100.0, " px")?;
+    within("--drift-px", options.drift_px_max, 0.0, 1000.0, " px")?;
     Ok(Settings {
         solver,
         scale,
@@ -260,7 +266,32 @@ fn settings(options: &SelfCalibrateOptions<'_>) -> Result<Settings, SelfCalibrat
     })
 }
 
-fn report(method: Method, views: Vec<SelfViewReport>, found: &SelfCalibration) -> SelfCalibrateReport {
+/// A length that is off by more than this share was given in another unit, or belongs to another rig.
+const BASELINE_OFF_MAX: f64 = 0.1;
+
+/// The calibration in force says how far apart the cameras are. What the options say of it, or the water's distance, should agree.
+fn warnings(options: &SelfCalibrateOptions<'_>, in_force_m: f64, found: &SelfCalibration) -> Vec<String> {
+    let off_m = (found.baseline_m - in_force_m).abs();
+    let half_m = SIGMAS_95 * found.baseline_sigma_m;
+    let doubt = match (options.baseline_m, options.altitude_m) {
+        (Some(stated_m), _) if off_m > BASELINE_OFF_MAX * in_force_m => format!(
+            "--baseline {stated_m} m is {:.3} times the {in_force_m:.4} m of the calibration in force: pictures without a known \
+             length cannot tell which is right, and every distance scales with it",
+            stated_m / in_force_m
+        ),
+        (None, Some(altitude_m)) if off_m > half_m.max(BASELINE_OFF_MAX * in_force_m) => format!(
+            "with --altitude {altitude_m} m the baseline comes out at {:.4} m (95 %: {:.4} to {:.4} m), far from the \
+             {in_force_m:.4} m of the calibration in force: one of the two is wrong",
+            found.baseline_m,
+            found.baseline_m - half_m,
+            found.baseline_m + half_m
+        ),
+        _ => return Vec::new(),
+    };
+    vec![doubt]
+}
+
+fn report(method: Method, views: Vec<SelfViewReport>, found: &SelfCalibration, warnings: Vec<String>) -> SelfCalibrateReport {
     let (turn, turn_sigma) = (found.turn_rad, found.turn_sigma_rad);
     let (direction, direction_sigma) = (found.direction_rad, found.direction_sigma_rad);
     SelfCalibrateReport {
@@ -275,8 +306,8 @@ fn report(method: Method, views: Vec<SelfViewReport>, found: &SelfCalibration) -
         baseline_down: AngleReport::new(direction.x, direction_sigma.x),
         baseline_forward: AngleReport::new(direction.y, direction_sigma.y),
         baseline_m: found.baseline_m,
-        baseline_m_low: found.baseline_m - 1.96 * found.baseline_sigma_m,
-        baseline_m_high: found.baseline_m + 1.96 * found.baseline_sigma_m,
+        baseline_m_low: found.baseline_m - SIGMAS_95 * found.baseline_sigma_m,
+        baseline_m_high: found.baseline_m + SIGMAS_95 * found.baseline_sigma_m,
         focal_scale: found.focal_scale.map(|(scale, _)| scale),
         focal_scale_sigma: found.focal_scale.map(|(_, sigma)| sigma),
         row_error_before_px: found.before.rms_px,
@@ -288,5 +319,6 @@ fn report(method: Method, views: Vec<SelfViewReport>, found: &SelfCalibration) -
             rotation_deg: other.rotation_rad.to_degrees(),
             direction_deg: other.direction_rad.to_degrees(),
         }),
+        warnings,
     }
 }

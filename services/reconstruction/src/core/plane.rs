@@ -20,7 +20,7 @@ const HYPOTHESES: usize = 96;
 /// Points that a hypothesis is judged by.
 const JUDGES: usize = 512;
 /// Points that say where the middle of all is; the last word is that of every point that belongs.
-const SAMPLE: usize = 8192;
+const SAMPLE: usize = 4096;
 /// Points that one task sums up. Fixed, so that rounding does not depend on how many threads there are.
 const CHUNK: usize = 8192;
 /// Points further from the plane than this many robust standard deviations are outliers. A Gaussian sea has crests of four.
@@ -157,12 +157,20 @@ impl DisparityPlane {
     pub(crate) fn refit(&self, matches: &[Match], limit_px: f32) -> Option<Self> {
         // About a point in the middle, so that the normal equations are well conditioned.
         let origin = matches.get(matches.len() / 2)?;
-        let (mut normal, mut right) = (Matrix3::<f64>::zeros(), Vector3::<f64>::zeros());
-        for point in matches.iter().filter(|point| self.residual(point).abs() <= limit_px) {
-            let row = Vector3::new(f64::from(point.x_px - origin.x_px), f64::from(point.y_px - origin.y_px), 1.0);
-            normal += row * row.transpose();
-            right += row * f64::from(self.residual(point));
+        // Of x, y and 1: their products, and products with the residual.
+        let (mut xx, mut xy, mut x, mut yy, mut y, mut count) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+        let mut right = Vector3::<f64>::zeros();
+        for point in matches {
+            let residual_px = self.residual(point);
+            if residual_px.abs() <= limit_px {
+                let (px, py) = (f64::from(point.x_px - origin.x_px), f64::from(point.y_px - origin.y_px));
+                let residual_px = f64::from(residual_px);
+                (xx, xy, x) = (xx + px * px, xy + px * py, x + px);
+                (yy, y, count) = (yy + py * py, y + py, count + 1.0);
+                right += Vector3::new(px * residual_px, py * residual_px, residual_px);
+            }
         }
+        let normal = Matrix3::new(xx, xy, x, xy, yy, y, x, y, count);
         let step = normal.cholesky()?.solve(&right);
         let (a, b) = (step.x as f32, step.y as f32);
         let c = step.z as f32 - a * origin.x_px - b * origin.y_px;
@@ -188,9 +196,11 @@ fn least_median(
     for _ in 0..HYPOTHESES {
         let [p, q, r] = std::array::from_fn(|_| &matches[random.random_range(0..matches.len())]);
         let Some(plane) = DisparityPlane::through(p, q, r) else { continue };
-        let median = median_deviation(judges, &plane, deviations);
-        if median.is_finite() && best.is_none_or(|(_, least)| median < least) {
-            best = Some((plane, median));
+        // A median is less than the least so far if more than half of the deviations are: counting is cheaper than sorting.
+        let least = best.map_or(f32::INFINITY, |(_, least)| least);
+        let less: u32 = judges.iter().map(|point| u32::from(plane.residual(point).abs() < least)).sum();
+        if less as usize > judges.len() / 2 {
+            best = Some((plane, median_deviation(judges, &plane, deviations)));
         }
     }
     best.map(|(plane, median)| (plane, median / MEDIAN_PER_SIGMA))
@@ -210,20 +220,24 @@ fn least_squares(matches: &[Match], rig: &RectifiedRig) -> Option<Plane> {
     let count = matches.len() as f64;
     // Sums about a nearby point: squares of depths would eat the digits that waves need.
     let origin = point(matches.first()?);
-    let sums: Vec<(Vector3<f64>, Matrix3<f64>)> = matches
+    // x, y, z; then xx, xy, xz, yy, yz, zz.
+    let sums: Vec<[f64; 9]> = matches
         .par_chunks(CHUNK)
         .map(|matches| {
-            let (mut sum, mut squares) = (Vector3::zeros(), Matrix3::zeros());
+            let mut sums = [0.0; 9];
             for m in matches {
                 let offset = point(m) - origin;
-                sum += offset;
-                squares += offset * offset.transpose();
+                let (x, y, z) = (offset.x, offset.y, offset.z);
+                let products = [x, y, z, x * x, x * y, x * z, y * y, y * z, z * z];
+                sums.iter_mut().zip(products).for_each(|(sum, product)| *sum += product);
             }
-            (sum, squares)
+            sums
         })
         .collect();
-    let zero = (Vector3::zeros(), Matrix3::zeros());
-    let (sum, squares) = sums.into_iter().fold(zero, |all, one| (all.0 + one.0, all.1 + one.1));
+    let mut all = [0.0; 9];
+    sums.iter().for_each(|one| all.iter_mut().zip(one).for_each(|(sum, one)| *sum += one));
+    let [x, y, z, xx, xy, xz, yy, yz, zz] = all;
+    let (sum, squares) = (Vector3::new(x, y, z), Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz));
     let mean = sum / count;
     let eigen = (squares / count - mean * mean.transpose()).symmetric_eigen();
     let smallest = eigen.eigenvalues.imin();

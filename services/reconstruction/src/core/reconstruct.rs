@@ -19,7 +19,7 @@ use super::grid::{GridError, Gridder, Sampling, SurfacePoint, remove_mean};
 use super::matcher::{DisparityRange, Engine, MatchError, Matcher};
 use super::plane::{self, DisparityPlane, Match, PlaneError};
 use super::rectify::{RectifiedRig, Rectifier, RectifyError};
-use super::refine::Refiner;
+use super::refine::{Every, Refined, Refiner};
 use super::scatter::Scatter;
 use super::tilt::{TiltCorrection, TiltFilter};
 
@@ -74,6 +74,8 @@ pub(crate) const REFINE_ROUNDS: u32 = 2;
 const SIGMA_MAX_PX: f32 = 0.5;
 /// Points that one task works through.
 const POINTS_A_CHUNK: usize = 4096;
+/// Pixels that one task counts.
+const PIXELS_A_CHUNK: usize = 1 << 18;
 /// Rows of matches that one task collects.
 const ROWS_A_BAND: usize = 32;
 /// With fewer of the pixels matched than this the search range was wrong, or there was nothing to see.
@@ -127,7 +129,7 @@ pub struct Reconstructor {
     /// Level of the last patch above the datum, metres: where the autopilot's height has wandered to.
     level_m: f64,
     disparity: Disparity,
-    sigma_px: Vec<f32>,
+    refined: Refined,
     matches: Vec<Match>,
     /// The matches of so many rows each.
     bands: Vec<Vec<Match>>,
@@ -145,7 +147,9 @@ impl Reconstructor {
     /// With these settings.
     #[must_use]
     pub fn new(settings: Settings) -> Self {
-        let refiner = (settings.refine_window_px > 0).then(|| Refiner::new(settings.refine_window_px, REFINE_ROUNDS));
+        // Only points need a disparity.
+        let every = if settings.point_stride_px.is_multiple_of(2) { Every::SecondPixel } else { Every::Pixel };
+        let refiner = (settings.refine_window_px > 0).then(|| Refiner::new(settings.refine_window_px, REFINE_ROUNDS, every));
         Self {
             matcher: settings.engine.matcher(settings.block_px),
             refiner,
@@ -157,7 +161,7 @@ impl Reconstructor {
             mount: FixedMount::default(),
             level_m: 0.0,
             disparity: Disparity::default(),
-            sigma_px: Vec::new(),
+            refined: Refined::default(),
             matches: Vec::new(),
             bands: Vec::new(),
             points: Vec::new(),
@@ -237,14 +241,14 @@ impl Reconstructor {
             stamp: *stamp,
             rig: rig.clone(),
             left_jpeg: left_jpeg.to_vec().into(),
-            disparity_png: colour::encode_png(&self.disparity)?.into(),
+            disparity_png: colour::encode_png(&self.disparity())?.into(),
         }))
     }
 
-    /// The disparity of the last pair, refined.
+    /// The disparity of the last pair, refined; pixels between those that became points are interpolated.
     #[must_use]
-    pub fn disparity(&self) -> &Disparity {
-        &self.disparity
+    pub fn disparity(&self) -> Disparity {
+        self.refined.full(self.disparity.width_px, self.disparity.height_px)
     }
 
     /// The matches of the last pair that belong to the water, row by row; outliers are gone.
@@ -274,7 +278,8 @@ impl Reconstructor {
     /// How many bytes the chain's own buffers hold.
     #[must_use]
     pub fn memory_bytes(&self) -> usize {
-        let floats = self.disparity.values_px.capacity() + self.sigma_px.capacity();
+        let refined = self.refined.disparity.values_px.capacity() + self.refined.sigma_px.capacity();
+        let floats = self.disparity.values_px.capacity() + refined;
         size_of::<f32>() * floats
             + size_of::<Match>() * (2 * self.matches.capacity())
             + size_of::<SurfacePoint>() * self.points.capacity()
@@ -355,34 +360,43 @@ impl Reconstructor {
         self.matcher.guide(guide);
         self.matcher.compute(left, right, range, &mut self.disparity)?;
         let enough = (DENSITY_MIN * self.disparity.values_px.len() as f64) as usize;
-        let matched = self.disparity.values_px.par_chunks(POINTS_A_CHUNK).map(finite).sum::<usize>();
+        let matched = self.disparity.values_px.par_chunks(PIXELS_A_CHUNK).map(finite).sum::<usize>();
         if matched < enough {
             return Err(PlaneError::TooFewPoints { points: matched, needed: enough }.into());
         }
         match &mut self.refiner {
             Some(refiner) => {
                 let (left, right) = rectifier.exact();
-                refiner.refine(left, right, &mut self.disparity, &mut self.sigma_px)?;
+                refiner.refine(left, right, &self.disparity, &mut self.refined)?;
             }
             None => {
-                self.sigma_px.clear();
-                self.sigma_px.resize(self.disparity.values_px.len(), SIGMA_UNREFINED_PX);
+                self.refined.every = Every::Pixel;
+                self.refined.disparity.clone_from(&self.disparity);
+                self.refined.sigma_px.clear();
+                self.refined.sigma_px.resize(self.disparity.values_px.len(), SIGMA_UNREFINED_PX);
             }
         }
-        let stride = self.settings.point_stride_px.max(1) as usize;
+        let step = self.refined.every.step_px();
+        let stride = self.settings.point_stride_px.max(1) as usize / step;
         // What a window saw beyond an edge was invented.
         let margin_px = self.window_px() / 2;
-        let (disparity, sigma_px, width) = (&self.disparity, &self.sigma_px, rig.width_px as usize);
-        let rows: Vec<u32> = (0..rig.height_px).step_by(stride).collect();
+        let (disparity, sigma_px) = (&self.refined.disparity, &self.refined.sigma_px);
+        let width = disparity.width_px as usize;
+        let rows: Vec<u32> = (0..disparity.height_px).step_by(stride).collect();
         self.bands.resize_with(rows.len().div_ceil(ROWS_A_BAND), Vec::new);
         rows.par_chunks(ROWS_A_BAND).zip(&mut self.bands).for_each(|(rows, band)| {
             band.clear();
-            for y in rows.iter().copied() {
-                let row = disparity.row(y).iter().zip(&sigma_px[y as usize * width..]).enumerate();
-                for (x, (disparity_px, sigma_px)) in row.step_by(stride).map(|(x, (d, s))| (x as u32, (*d, *s))) {
+            for row in rows.iter().copied() {
+                let Some(seen) = rectifier.seen(row * step as u32, margin_px) else { continue };
+                let y_px = (row as usize * step) as f32;
+                let sigmas_px = &sigma_px[row as usize * width..][..width];
+                let disparities_px = disparity.row(row);
+                for col in (0..width).step_by(stride) {
+                    let (disparity_px, sigma_px) = (disparities_px[col], sigmas_px[col]);
+                    let x = (col * step) as u32;
                     // Comparisons with NaN are false: what was not matched stays out.
-                    if disparity_px > 0.0 && sigma_px <= SIGMA_MAX_PX && rectifier.is_seen(x, y, disparity_px, margin_px) {
-                        band.push(Match { x_px: x as f32, y_px: y as f32, disparity_px, sigma_px });
+                    if disparity_px > 0.0 && sigma_px <= SIGMA_MAX_PX && seen.has(x, disparity_px) {
+                        band.push(Match { x_px: x as f32, y_px, disparity_px, sigma_px });
                     }
                 }
             }
@@ -406,17 +420,24 @@ impl Reconstructor {
             let sigma_m = f64::from(m.sigma_px) * depth_m / disparity_px * along_normal;
             SurfacePoint { north_m: ned_m.x, east_m: ned_m.y, up_m: -ned_m.z as f32, sigma_m: sigma_m as f32 }
         };
-        self.matches.par_iter().with_min_len(POINTS_A_CHUNK).map(place).collect_into_vec(&mut self.points);
-        let sum = |points: &[SurfacePoint]| {
-            points.iter().fold(Vector3::zeros(), |sum, point| sum + Vector3::new(point.north_m, point.east_m, 0.0))
-        };
+        let none = SurfacePoint { north_m: 0.0, east_m: 0.0, up_m: 0.0, sigma_m: 0.0 };
+        self.points.resize(self.matches.len(), none);
+        let chunks = self.matches.par_chunks(POINTS_A_CHUNK).zip(self.points.par_chunks_mut(POINTS_A_CHUNK));
         // Sums of fixed chunks: rounding does not depend on how many threads there are.
-        let sums: Vec<Vector3<f64>> = self.points.par_chunks(POINTS_A_CHUNK).map(sum).collect();
-        let depths = |matches: &[Match]| matches.iter().map(|m| focal_baseline / f64::from(m.disparity_px)).sum();
-        let depths_m: Vec<f64> = self.matches.par_chunks(POINTS_A_CHUNK).map(depths).collect();
+        let sums: Vec<Vector3<f64>> = chunks
+            .map(|(matches, points)| {
+                let mut sum = Vector3::zeros();
+                for (m, point) in matches.iter().zip(points) {
+                    *point = place(m);
+                    sum += Vector3::new(point.north_m, point.east_m, focal_baseline / f64::from(m.disparity_px));
+                }
+                sum
+            })
+            .collect();
+        let sum = sums.iter().sum::<Vector3<f64>>();
         let count = self.points.len().max(1) as f64;
-        self.centre = sums.iter().sum::<Vector3<f64>>().xy() / count;
-        self.mean_depth_m = depths_m.iter().sum::<f64>() / count;
+        self.centre = sum.xy() / count;
+        self.mean_depth_m = sum.z / count;
         let pixel_m = self.mean_depth_m / rig.focal_px;
         let window_px = self.window_px();
         Sampling {
@@ -475,7 +496,8 @@ impl Reconstructor {
             let disparity_px = rig.focal_px * rig.baseline_m / seen.z;
             if seen.z > 0.0
                 && inside
-                && rectifier.is_seen(x_px.round() as u32, y_px.round() as u32, disparity_px as f32, self.window_px() / 2)
+                && let Some(seen) = rectifier.seen(y_px.round() as u32, self.window_px() / 2)
+                && seen.has(x_px.round() as u32, disparity_px as f32)
             {
                 in_view += 1;
                 measured += u32::from(elevation.is_finite());

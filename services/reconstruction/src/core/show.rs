@@ -2,7 +2,7 @@
 
 use halcyon_model::{Image, RigCalibration};
 use nalgebra::Vector2;
-use opencv::core::{Mat, MatTraitConst, Point, Rect, Scalar, ToInputArray, Vector};
+use opencv::core::{Mat, MatTraitConst, Point, Rect, Scalar, Size, ToInputArray, Vector};
 use opencv::prelude::{MatTrait, VectorToVec};
 use opencv::{imgcodecs, imgproc};
 
@@ -81,6 +81,24 @@ pub fn rectification_png(left: &Image, right: &Image, rig: &RigCalibration) -> R
     Ok(encode(&canvas)?)
 }
 
+/// A picture as a page shows it: at most `width_px_max` wide, as JPEG, which is a tenth of a photograph's PNG.
+///
+/// # Errors
+/// OpenCV's, for what is no picture.
+pub fn for_page(picture: &[u8], width_px_max: u32) -> opencv::Result<Vec<u8>> {
+    let whole = imgcodecs::imdecode(&Mat::from_slice(picture)?, imgcodecs::IMREAD_COLOR)?;
+    let scale = f64::from(width_px_max) / f64::from(whole.cols().max(1));
+    let mut shown = Mat::default();
+    if scale < 1.0 {
+        imgproc::resize(&whole, &mut shown, Size::default(), scale, scale, imgproc::INTER_AREA)?;
+    } else {
+        shown = whole;
+    }
+    let mut jpeg = Vector::<u8>::new();
+    imgcodecs::imencode(".jpg", &shown, &mut jpeg, &Vector::from_slice(&[imgcodecs::IMWRITE_JPEG_QUALITY, 80]))?;
+    Ok(jpeg.to_vec())
+}
+
 fn pixel(at: Vector2<f64>) -> Point {
     // Far outside is as good as outside.
     let whole = |x: f64| x.round().clamp(-1e5, 1e5) as i32;
@@ -126,6 +144,17 @@ mod tests {
         for (pixel, level) in read.data_typed::<Vec3b>().unwrap().iter().zip(image.pixels()) {
             assert_eq!(pixel.0, [*level; 3]);
         }
+    }
+
+    #[test]
+    fn a_pages_picture_is_small_and_of_the_same_shape() {
+        let png = grey_png(&blobs()).unwrap();
+        let small = decoded(&for_page(&png, 80).unwrap());
+        assert_eq!((small.cols(), small.rows()), (80, 80));
+        assert_eq!(decoded(&for_page(&png, 1000).unwrap()).cols(), SIDE_PX as i32);
+        // The middle of a dark square, four pixels wide by now.
+        assert!(small.at_2d::<Vec3b>(2, 2).unwrap()[0] < 80 && small.at_2d::<Vec3b>(2, 6).unwrap()[0] > 160);
+        assert!(for_page(b"no picture", 80).is_err());
     }
 
     #[test]

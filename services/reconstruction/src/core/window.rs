@@ -1,5 +1,5 @@
-//! Sums over square windows that slide: down a band of rows one row is added and one taken away, along a row powers of two are
-//! added up. The cost hardly grows with the window.
+//! Sums over square windows that slide: down a band of rows one row is added and one taken away, along a row each sum is added up in
+//! registers.
 
 /// Rows that one task works through. Fixed, so that rounding, and with it the result, does not depend on how many threads there are.
 pub(crate) const BAND_ROWS: usize = 64;
@@ -30,42 +30,54 @@ pub(crate) trait Addend: Copy + Default + std::ops::Add<Output = Self> {}
 impl Addend for f32 {}
 impl Addend for u16 {}
 
+/// Values that are worked on side by side.
+const LANES: usize = 32;
+
 /// `to[x]` becomes the sum of `window` values of `from` from x on; `from` is longer than `to` by window − 1.
 #[inline(always)]
-pub(crate) fn sums<T: Addend>(from: &[T], window: usize, scratch: &mut [Vec<T>; 2], to: &mut [T]) {
-    let count = to.len();
-    let [power, next] = scratch;
-    power.clear();
-    power.extend_from_slice(&from[..count + window - 1]);
-    next.resize(power.len(), T::default());
-    // `power[x]` is the sum of `span` values from x on; each bit of the window takes one such sum.
-    let (mut span, mut offset, mut rest, mut first) = (1, 0, window, true);
-    loop {
-        if rest & 1 == 1 {
-            let shifted = &power[offset..offset + count];
-            if first {
-                to.copy_from_slice(shifted);
-                first = false;
-            } else {
-                for (to, value) in to.iter_mut().zip(shifted) {
-                    *to = *to + *value;
-                }
+pub(crate) fn sums<T: Addend>(from: &[T], window: usize, to: &mut [T]) {
+    let (blocks, rest) = to.as_chunks_mut::<LANES>();
+    let done = blocks.len() * LANES;
+    for (block, to) in blocks.iter_mut().enumerate() {
+        let from = &from[block * LANES..][..LANES + window - 1];
+        let mut sum = [T::default(); LANES];
+        for step in 0..window {
+            let Some(from) = from[step..].first_chunk::<LANES>() else { break };
+            for (sum, from) in sum.iter_mut().zip(from) {
+                *sum = *sum + *from;
             }
-            offset += span;
         }
-        rest >>= 1;
-        if rest == 0 {
-            return;
+        *to = sum;
+    }
+    for (to, from) in rest.iter_mut().zip(from[done..].windows(window)) {
+        *to = from.iter().fold(T::default(), |sum, value| sum + *value);
+    }
+}
+
+/// `to[i]` becomes the sum of `window` (odd) values of `from` from 2 i on.
+#[inline(always)]
+pub(crate) fn sums_of_every_second<T: Addend>(from: &[T], window: usize, scratch: &mut [Vec<T>; 2], to: &mut [T]) {
+    let half = window / 2;
+    let [pairs, evens] = scratch;
+    pairs.resize(to.len() + half, T::default());
+    evens.resize(to.len() + half, T::default());
+    for ((pair, even), from) in pairs.iter_mut().zip(evens.iter_mut()).zip(from.as_chunks::<2>().0) {
+        *pair = from[0] + from[1];
+        *even = from[0];
+    }
+    // The last value may have no partner.
+    if let (true, Some(last), Some(even)) = (from.len() % 2 == 1, from.last(), evens.get_mut(from.len() / 2)) {
+        *even = *last;
+    }
+    match half {
+        0 => to.copy_from_slice(&evens[..to.len()]),
+        half => {
+            let count = to.len();
+            sums(&pairs[..count + half - 1], half, to);
+            for (to, even) in to.iter_mut().zip(&evens[half..]) {
+                *to = *to + *even;
+            }
         }
-        let left = power.len() - span;
-        for (next, (a, b)) in next[..left].iter_mut().zip(power[..left].iter().zip(&power[span..])) {
-            *next = *a + *b;
-        }
-        power.truncate(left);
-        next.truncate(left);
-        std::mem::swap(power, next);
-        next.resize(power.len(), T::default());
-        span *= 2;
     }
 }
 
@@ -88,12 +100,17 @@ mod tests {
 
     #[test]
     fn windows_of_any_width_are_summed() {
-        let from: Vec<u16> = (0..60).map(|i| i * i % 37).collect();
-        for window in 1..20 {
+        let from: Vec<u16> = (0..297).map(|i| i * i % 37).collect();
+        for (window, from) in (1..24).flat_map(|window| [(window, &from[..]), (window, &from[1..])]) {
             let mut to = vec![0; from.len() + 1 - window];
-            sums(&from, window, &mut Default::default(), &mut to);
+            sums(from, window, &mut to);
             let plain: Vec<u16> = from.windows(window).map(|w| w.iter().sum()).collect();
             assert_eq!(to, plain, "{window}");
+            if window % 2 == 1 {
+                let mut to = vec![0; plain.len().div_ceil(2)];
+                sums_of_every_second(from, window, &mut Default::default(), &mut to);
+                assert_eq!(to, plain.iter().copied().step_by(2).collect::<Vec<_>>(), "every second of {window}");
+            }
         }
     }
 }

@@ -1,4 +1,4 @@
-//! `*` and `?` in paths, expanded by us where the shell did not, in natural order: `left2` before `left10`.
+//! `*`, `?` and `[…]` in paths, expanded by us where the shell did not, in natural order: `left2` before `left10`.
 
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
@@ -23,21 +23,23 @@ pub enum GlobError {
     },
 }
 
-/// The files that match `pattern`, in natural order. `*` stands for any characters but `/`, `?` for one of them; a pattern
-/// without either names one file, which need not exist (reading it will say so).
+/// The files that match `pattern`, in natural order. `*` stands for any characters but `/`, `?` for one of them, `[1-3a]` for one of
+/// a set, `[!1]` for one that is not in it. A file of exactly this name comes before any pattern; without wildcards the name need
+/// not exist (reading it will say so).
 ///
 /// # Errors
 /// [`GlobError`] where nothing matches or a folder cannot be listed.
 pub fn glob(pattern: &str) -> Result<Vec<PathBuf>, GlobError> {
-    let is_pattern = |text: &str| text.contains(['*', '?']);
-    if !is_pattern(pattern) && !pattern.is_empty() {
+    let is_pattern = |text: &str| text.contains(['*', '?', '[']);
+    // `left[12].png` may well be a name: browsers and cameras make such.
+    if !pattern.is_empty() && (!is_pattern(pattern) || Path::new(pattern).exists()) {
         return Ok(vec![PathBuf::from(pattern)]);
     }
     let mut found = vec![if pattern.starts_with('/') { PathBuf::from("/") } else { PathBuf::new() }];
     for part in pattern.split('/').filter(|part| !part.is_empty()) {
         let mut next = Vec::new();
         for folder in found {
-            if !is_pattern(part) {
+            if !is_pattern(part) || folder.join(part).is_dir() {
                 next.push(folder.join(part));
                 continue;
             }
@@ -54,7 +56,7 @@ pub fn glob(pattern: &str) -> Result<Vec<PathBuf>, GlobError> {
                 let name = entry.map_err(|source| GlobError::List { folder: folder.clone(), source })?.file_name();
                 let text = name.to_string_lossy();
                 // As in a shell, a wildcard does not find hidden files.
-                if matches(part.as_bytes(), text.as_bytes()) && (!text.starts_with('.') || part.starts_with('.')) {
+                if matches(&parts(part), &text) && (!text.starts_with('.') || part.starts_with('.')) {
                     next.push(folder.join(&name));
                 }
             }
@@ -69,18 +71,89 @@ pub fn glob(pattern: &str) -> Result<Vec<PathBuf>, GlobError> {
     Ok(found)
 }
 
+/// One place of a pattern.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Part {
+    /// `*`
+    Any,
+    /// `?`
+    One,
+    /// `[…]`: ranges of characters, and whether the character must be in none of them.
+    Set(Vec<(char, char)>, bool),
+    /// This character.
+    Just(char),
+}
+
+impl Part {
+    fn fits(&self, c: char) -> bool {
+        match self {
+            Self::Any => false,
+            Self::One => true,
+            Self::Set(ranges, is_negated) => ranges.iter().any(|(low, high)| (*low..=*high).contains(&c)) != *is_negated,
+            Self::Just(own) => *own == c,
+        }
+    }
+}
+
+/// Takes a pattern apart. A `[` without its `]` stands for itself, as in a shell.
+fn parts(pattern: &str) -> Vec<Part> {
+    let mut parts = Vec::new();
+    let mut rest = pattern;
+    while let Some(c) = rest.chars().next() {
+        rest = &rest[c.len_utf8()..];
+        parts.push(match c {
+            '*' => Part::Any,
+            '?' => Part::One,
+            '[' => match set(rest) {
+                Some((set, after)) => {
+                    rest = after;
+                    set
+                }
+                None => Part::Just('['),
+            },
+            other => Part::Just(other),
+        });
+    }
+    parts
+}
+
+/// The set that `text` starts with, behind its `[`, and what follows it. A `]` right at the start is in the set.
+fn set(text: &str) -> Option<(Part, &str)> {
+    let (is_negated, body) = match text.strip_prefix(['!', '^']) {
+        Some(body) => (true, body),
+        None => (false, text),
+    };
+    let first = body.chars().next()?.len_utf8();
+    let end = first + body[first..].find(']')?;
+    let inner: Vec<char> = body[..end].chars().collect();
+    let (mut ranges, mut at) = (Vec::new(), 0);
+    while let Some(low) = inner.get(at).copied() {
+        match (inner.get(at + 1), inner.get(at + 2)) {
+            (Some('-'), Some(high)) => {
+                ranges.push((low, *high));
+                at += 3;
+            }
+            _ => {
+                ranges.push((low, low));
+                at += 1;
+            }
+        }
+    }
+    Some((Part::Set(ranges, is_negated), &body[end + 1..]))
+}
+
 /// Linear in practice and never worse than quadratic: only the last `*` is ever tried again.
-fn matches(pattern: &[u8], text: &[u8]) -> bool {
+fn matches(pattern: &[Part], text: &str) -> bool {
+    let text: Vec<char> = text.chars().collect();
     let (mut p, mut t) = (0, 0);
     let mut star: Option<(usize, usize)> = None;
     while t < text.len() {
         match pattern.get(p) {
-            Some(b'*') => {
+            Some(Part::Any) => {
                 star = Some((p, t));
                 p += 1;
             }
-            Some(b'?') => (p, t) = (p + 1, t + 1),
-            Some(byte) if *byte == text[t] => (p, t) = (p + 1, t + 1),
+            Some(part) if part.fits(text[t]) => (p, t) = (p + 1, t + 1),
             _ => match star {
                 Some((at, from)) => {
                     star = Some((at, from + 1));
@@ -90,7 +163,7 @@ fn matches(pattern: &[u8], text: &[u8]) -> bool {
             },
         }
     }
-    pattern[p..].iter().all(|byte| *byte == b'*')
+    pattern[p..].iter().all(|part| *part == Part::Any)
 }
 
 /// Runs of digits compare as numbers, everything else as text.
@@ -123,7 +196,7 @@ mod tests {
     #[test]
     fn wildcards() {
         let check = |pattern: &str, text: &str, expected| {
-            assert_eq!(matches(pattern.as_bytes(), text.as_bytes()), expected, "{pattern} {text}");
+            assert_eq!(matches(&parts(pattern), text), expected, "{pattern} {text}");
         };
         check("left*.jpg", "left01.jpg", true);
         check("left??.jpg", "left01.jpg", true);
@@ -131,6 +204,35 @@ mod tests {
         check("*a*b", "xaxbxab", true);
         check("*a*b", "xaxbxa", false);
         check("*", "", true);
+        check("left?.jpg", "leftµ.jpg", true);
+        check("left[12].jpg", "left2.jpg", true);
+        check("left[12].jpg", "left3.jpg", false);
+        check("left[0-2a]*.jpg", "left1x.jpg", true);
+        check("left[0-2a]*.jpg", "lefta.jpg", true);
+        check("left[!0-2].jpg", "left1.jpg", false);
+        check("left[!0-2].jpg", "left7.jpg", true);
+        check("left[]-].jpg", "left].jpg", true);
+        check("left[12.jpg", "left[12.jpg", true);
+        check("left[2-1].jpg", "left1.jpg", false);
+        check("[", "[", true);
+        check("[]", "[]", true);
+    }
+
+    #[test]
+    fn a_file_of_that_very_name_comes_before_the_pattern() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let found = |name: &str| glob(at(name).to_str().unwrap()).unwrap();
+        for name in ["left1.png", "left2.png", "left[12].png"] {
+            std::fs::write(at(name), "").unwrap();
+        }
+        assert_eq!(found("left[12].png"), [at("left[12].png")]);
+        std::fs::remove_file(at("left[12].png")).unwrap();
+        assert_eq!(found("left[12].png"), [at("left1.png"), at("left2.png")]);
+        // A folder's name, too, may look like a pattern.
+        std::fs::create_dir(at("run[1]")).unwrap();
+        std::fs::write(at("run[1]/a.png"), "").unwrap();
+        assert_eq!(found("run[1]/*.png"), [at("run[1]/a.png")]);
     }
 
     #[test]

@@ -103,7 +103,9 @@ impl Series {
     }
 
     /// Writes all patches with CF-1.8 names: `elevation(time, north, east)` above each patch's own mean level, its standard
-    /// error, and for each time level, plane and coverage. `time` is unlimited, so that other tools can append.
+    /// error, and for each time level, plane and coverage. `time` is unlimited, so that other tools can append. In the plane's frame
+    /// the axes are `y` (to the top of the left picture) and `x` (to its right). Stamps without a date become seconds since the
+    /// first; where there are none the variable `time` is left out.
     ///
     /// # Errors
     /// [`SeriesError`]; then nothing is left under `path`.

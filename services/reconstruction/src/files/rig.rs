@@ -9,7 +9,7 @@ use halcyon_model::rig_yaml::{self, RigYamlError};
 use super::{FileError, read_bytes, write_bytes};
 
 /// Names of ROS's two files in their folder.
-const ROS_FILES: [&str; 2] = ["left.yaml", "right.yaml"];
+pub(super) const ROS_FILES: [&str; 2] = ["left.yaml", "right.yaml"];
 
 /// Why there is no rig.
 #[derive(Debug, thiserror::Error)]
@@ -26,6 +26,59 @@ pub enum RigFileError {
         #[source]
         source: RigYamlError,
     },
+    /// Numbers that no rig has.
+    #[error("{} is no calibration of a rig", path.display())]
+    Impossible {
+        /// The file, or the folder of the two.
+        path: PathBuf,
+        /// Which number.
+        #[source]
+        source: ImpossibleRig,
+    },
+}
+
+/// A number of a calibration that no rig has.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{what} must be {low} to {high} {unit}, not {value}")]
+pub struct ImpossibleRig {
+    what: &'static str,
+    value: f64,
+    low: f64,
+    high: f64,
+    unit: &'static str,
+}
+
+/// A focal length of 0.05 to 100 widths of the picture: from wider than any fisheye to the longest lens.
+const FOCAL_WIDTHS: [f64; 2] = [0.05, 100.0];
+/// Between a stereo microscope and two ships, metres.
+const BASELINE_M: [f64; 2] = [1e-3, 100.0];
+/// A camera is not further from its carrier's middle, metres.
+const MOUNT_M_MAX: f64 = 100.0;
+
+/// Refuses what is a calibration by its form, but of no rig: a decimal point lost, millimetres for metres, or nonsense.
+///
+/// # Errors
+/// [`ImpossibleRig`], naming the number and its unit.
+pub fn check_rig(rig: &RigCalibration) -> Result<(), ImpossibleRig> {
+    let within = |what, value: f64, [low, high]: [f64; 2], unit| {
+        // NaN is in no range.
+        if (low..=high).contains(&value) { Ok(()) } else { Err(ImpossibleRig { what, value, low, high, unit }) }
+    };
+    let (width_px, height_px) = (f64::from(rig.width_px), f64::from(rig.height_px));
+    let focal_px = FOCAL_WIDTHS.map(|widths| widths * width_px.max(height_px));
+    // The sensor may sit beside the axis, as in a lens that shifts, but not by more than its own side.
+    let beside = |side_px: f64| [-side_px, 2.0 * side_px];
+    for (names, camera) in [
+        (["the left camera's fx", "the left camera's fy", "the left camera's cx", "the left camera's cy"], &rig.left),
+        (["the right camera's fx", "the right camera's fy", "the right camera's cx", "the right camera's cy"], &rig.right),
+    ] {
+        within(names[0], camera.fx_px, focal_px, "px")?;
+        within(names[1], camera.fy_px, focal_px, "px")?;
+        within(names[2], camera.cx_px, beside(width_px), "px")?;
+        within(names[3], camera.cy_px, beside(height_px), "px")?;
+    }
+    within("the baseline |T|", rig.baseline_m(), BASELINE_M, "m (T is in metres)")?;
+    within("the camera's place |camera_in_body_m|", rig.camera_in_body_m.norm(), [0.0, MOUNT_M_MAX], "m")
 }
 
 /// Reads a rig: `path` is an OpenCV YAML file, or a folder with ROS's `left.yaml` and `right.yaml`.
@@ -33,6 +86,12 @@ pub enum RigFileError {
 /// # Errors
 /// [`RigFileError`], naming the file, the line and the key.
 pub fn read_rig(path: &Path) -> Result<RigCalibration, RigFileError> {
+    let rig = parse(path)?;
+    check_rig(&rig).map_err(|source| RigFileError::Impossible { path: path.into(), source })?;
+    Ok(rig)
+}
+
+fn parse(path: &Path) -> Result<RigCalibration, RigFileError> {
     if path.is_dir() {
         let read = |name: &str| -> Result<CameraInfo, RigFileError> {
             let file = path.join(name);
@@ -42,6 +101,12 @@ pub fn read_rig(path: &Path) -> Result<RigCalibration, RigFileError> {
         return camera_info::rig(&left, &right).map_err(|source| RigFileError::Content { path: path.into(), source });
     }
     rig_yaml::parse(&text(path)?).map_err(|source| RigFileError::Content { path: path.into(), source })
+}
+
+/// The files that [`read_rig`] reads.
+#[must_use]
+pub fn rig_files(path: &Path) -> Vec<PathBuf> {
+    if path.is_dir() { ROS_FILES.map(|name| path.join(name)).to_vec() } else { vec![path.into()] }
 }
 
 /// Writes a rig as OpenCV's YAML.
@@ -67,4 +132,41 @@ pub fn write_ros(folder: &Path, infos: &[CameraInfo; 2]) -> Result<(), FileError
 /// Bytes that are no UTF-8 are no calibration either: they come out as a syntax error with its line.
 fn text(path: &Path) -> Result<String, FileError> {
     Ok(String::from_utf8_lossy(&read_bytes(path)?).into_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use halcyon_model::CameraIntrinsics;
+    use nalgebra::{Matrix3, Vector3};
+
+    use super::*;
+
+    #[test]
+    fn a_rig_that_cannot_be_is_named_with_its_unit() {
+        let camera = CameraIntrinsics { fx_px: 509.0, fy_px: 509.0, cx_px: 319.5, cy_px: 239.5, distortion: [0.0; 5] };
+        let rig = RigCalibration {
+            width_px: 640,
+            height_px: 480,
+            left: camera,
+            right: camera,
+            right_from_left: Matrix3::identity(),
+            right_from_left_m: Vector3::new(-0.092, 0.0, 0.0),
+            body_from_camera: RigCalibration::LOOKING_DOWN,
+            camera_in_body_m: Vector3::zeros(),
+        };
+        assert_eq!(check_rig(&rig), Ok(()));
+        let check = |change: &dyn Fn(&mut RigCalibration), expected: &str| {
+            let mut rig = rig;
+            change(&mut rig);
+            let text = check_rig(&rig).unwrap_err().to_string();
+            assert!(text.contains(expected), "{text}");
+        };
+        check(&|r| r.left.fx_px = 1e308, "left camera's fx must be 32 to 64000 px");
+        check(&|r| r.right.fy_px = 1e-3, "right camera's fy");
+        check(&|r| r.right.cx_px = f64::NAN, "right camera's cx must be -640 to 1280 px");
+        check(&|r| r.left.cy_px = 1e6, "left camera's cy");
+        check(&|r| r.right_from_left_m.x = -920.0, "the baseline |T| must be 0.001 to 100 m (T is in metres), not 920");
+        check(&|r| r.right_from_left_m.x = -1e-9, "baseline");
+        check(&|r| r.camera_in_body_m.z = f64::INFINITY, "camera_in_body_m");
+    }
 }

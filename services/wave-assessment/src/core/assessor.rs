@@ -63,6 +63,13 @@ impl Assessor {
         Ok(self.assess(now))
     }
 
+    /// The sea state of the window as it stands, whenever the last one was; `None` before the first patch.
+    pub fn conclude(&mut self, now: Stamp) -> Option<SeaState> {
+        self.assessed = self.window.newest().map(|frame| frame.stamp);
+        self.issued = Some(now);
+        self.assess(now)
+    }
+
     /// To be called now and then: an inconclusive sea state, once in `period_s`, while patches have stopped coming; `None` while they
     /// come, and before the first.
     pub fn tick(&mut self, now: Stamp) -> Option<SeaState> {

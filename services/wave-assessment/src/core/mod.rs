@@ -23,3 +23,5 @@ mod window;
 
 pub use assessor::Assessor;
 pub use patch::PatchError;
+pub(crate) use statistics::Statistics;
+pub(crate) use verdict::{Evidence, judge};

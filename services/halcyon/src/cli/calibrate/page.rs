@@ -1,7 +1,7 @@
 //! The calibration report.
 
 use halcyon_reconstruction::cli::{CalibrateReport, CameraReport, CoverageReport};
-use halcyon_reconstruction::core::calibrate::{Calibration, ViewQuality};
+use halcyon_reconstruction::core::calibrate::{Calibration, SIGMAS_95, ViewQuality};
 
 use crate::report::{Bars, Chart, ChartError, HeatMap, Page, Series};
 
@@ -44,7 +44,7 @@ fn summary(page: &mut Page, report: &CalibrateReport) {
         match (report.board_warp_m, report.board_warp_m_low) {
             (Some(warp), Some(low)) => {
                 let [x, y] = [0, 1].map(|k| format!("{:.3} ± {:.3} mm", 1e3 * warp[k], 1e3 * (warp[k] - low[k])));
-                format!("{x}, {y}")
+                format!("{x}, {y} (95 %)")
             }
             _ => "none: the board is flat as far as these pictures tell".to_owned(),
         },
@@ -60,7 +60,7 @@ fn parameters(page: &mut Page, report: &CalibrateReport) {
     let values = |camera: &CameraReport| -> Vec<f64> {
         [camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px].into_iter().chain(camera.distortion).collect()
     };
-    let cell = |value: f64, sigma: f64| if sigma == 0.0 { "fixed".to_owned() } else { measured(value, 1.96 * sigma) };
+    let cell = |value: f64, sigma: f64| if sigma == 0.0 { "fixed".to_owned() } else { measured(value, SIGMAS_95 * sigma) };
     let (left, right) = (values(&report.left), values(&report.right));
     let rows: Vec<[String; 3]> = NAMES
         .iter()
@@ -164,7 +164,7 @@ fn residuals(page: &mut Page, calibration: &Calibration) -> Result<(), ChartErro
 fn depth(page: &mut Page, report: &CalibrateReport) -> Result<(), ChartError> {
     let depth = &report.depth_uncertainty;
     page.heading("Depth uncertainty").paragraph(&format!(
-        "Standard deviation of the depth of a point {} m in front of the left camera that this calibration's uncertainty alone \
+        "Half of the 95 % interval of the depth of a point {} m in front of the left camera that this calibration's uncertainty alone \
          brings; matching adds its own. Grey: the right camera does not see the point.",
         depth.distance_m
     ));
@@ -173,13 +173,14 @@ fn depth(page: &mut Page, report: &CalibrateReport) -> Result<(), ChartError> {
         return Ok(());
     };
     // Where no corner was, towards the picture's own corners, it grows tenfold: that would leave the rest one colour.
-    let most_mm = (1e3 * max_m).min(5e3 * median_m);
-    let values = depth.sigma_m.iter().map(|sigma| sigma.map_or(f64::NAN, |sigma| (1e3 * sigma).min(most_mm))).collect();
+    let half_mm = |sigma_m: f64| 1e3 * SIGMAS_95 * sigma_m;
+    let most_mm = half_mm(max_m).min(5.0 * half_mm(median_m));
+    let values = depth.sigma_m.iter().map(|sigma| sigma.map_or(f64::NAN, |sigma_m| half_mm(sigma_m).min(most_mm))).collect();
     let caption = format!(
-        "One standard deviation over the left picture: {:.2} mm in the median, {:.1} mm at most; more than {most_mm:.1} mm is \
+        "Half of the 95 % interval over the left picture: {:.2} mm in the median, {:.1} mm at most; more than {most_mm:.1} mm is \
          drawn as that",
-        1e3 * median_m,
-        1e3 * max_m
+        half_mm(median_m),
+        half_mm(max_m)
     );
     page.figure(&over_picture(report, depth.cols, values, "mm")?, &caption);
     Ok(())

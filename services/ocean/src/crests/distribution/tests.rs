@@ -129,7 +129,7 @@ fn high_waves_of_a_random_sea_are_boccottis() {
         let mut elevation_m = inverse.make_output_vec();
         inverse.process(&mut bins, &mut elevation_m).unwrap();
         let record = Record::new(elevation_m, rate_hz).unwrap();
-        heights.extend(crossing::waves(&record, Crossing::Up, 0.0).iter().map(|w| w.height_m()));
+        heights.extend(crossing::waves(&record, Crossing::Up, 0.0).iter().map(crate::crossing::Wave::height_m));
     }
     heights.sort_by(f64::total_cmp);
     let boccotti = Boccotti::heights(sea.m0, NarrowBand::of(lines).unwrap());

@@ -8,7 +8,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use super::ReconstructCliError;
 use crate::core::matcher::{DisparityRange, Engine};
 use crate::core::reconstruct::Settings;
-use crate::files::FileError;
+use crate::files::{FileError, Output, check_outputs};
 
 /// A cell of about so many pixels holds one independent measurement: the side of the matching window.
 const CELL_PX: f64 = 10.0;
@@ -62,11 +62,11 @@ impl ReconstructOptions {
         let max_px = self.max_disparity_px.unwrap_or((f64::from(width_px) * RANGE_SHARE) as u32).max(1);
         let value = |name, expected, value| Err(ReconstructCliError::Value { name, expected, value });
         if self.max_disparity_px == Some(0) || max_px >= width_px.max(2) || max_px > 2000 {
-            return value("--max-disparity", "at least 1, at most 2000 and below the pictures' width", f64::from(max_px));
+            return value("--max-disparity", "at least 1 px, at most 2000 px and below the pictures' width", f64::from(max_px));
         }
         let stride_px = self.stride_px.unwrap_or(stride_px_default);
         if !(1..=64).contains(&stride_px) {
-            return value("--stride", "1 to 64", f64::from(stride_px));
+            return value("--stride", "1 to 64 px", f64::from(stride_px));
         }
         if let Some(cell_m) = self.cell_m
             && !(1e-4..=100.0).contains(&cell_m)
@@ -84,28 +84,34 @@ impl ReconstructOptions {
         })
     }
 
-    /// Refuses names that say no format, before any work is done.
-    pub(super) fn check_outputs(&self) -> Result<(), FileError> {
-        let check = |path: &Option<PathBuf>, endings: &[&str], expected| match path {
-            Some(path) if !has_ending(path, endings) => Err(FileError::Extension { path: path.clone(), expected }),
-            _ => Ok(()),
-        };
-        check(&self.cloud, &["ply"], ".ply")?;
-        check(&self.mesh, &["ply"], ".ply")?;
-        check(&self.disparity, &["pfm", "png"], ".pfm or .png")?;
-        check(&self.grid, &["nc", "nc4"], ".nc")?;
-        check(&self.wass, &["nc", "nc4"], ".nc")
+    /// Refuses outputs that cannot be written, or that are inputs or each other, before any work is done.
+    pub(super) fn check_outputs<'a>(
+        &self,
+        inputs: impl IntoIterator<Item = (&'static str, &'a Path)>,
+    ) -> Result<(), FileError> {
+        let bytes = |option, path: &Option<PathBuf>, endings| path.as_ref().map(|path| Output::file(option, path, endings));
+        let library =
+            |option, path: &Option<PathBuf>| path.as_ref().map(|path| Output::plain_file(option, path, &["nc", "nc4"]));
+        let outputs = [
+            bytes("--cloud", &self.cloud, &["ply"]),
+            bytes("--mesh", &self.mesh, &["ply"]),
+            bytes("--disparity", &self.disparity, &["pfm", "png"]),
+            library("--grid", &self.grid),
+            library("--wass", &self.wass),
+        ];
+        Ok(check_outputs(inputs, &outputs.into_iter().flatten().collect::<Vec<_>>())?)
+    }
+
+    /// Whether an output is made of the elevation grid; without any output the grid's figures are the result.
+    pub(super) fn needs_grid(&self) -> bool {
+        let needs = self.grid.is_some() || self.wass.is_some() || (self.mesh.is_some() && self.mesh_of == MeshOf::Grid);
+        needs || (self.cloud.is_none() && self.mesh.is_none() && self.disparity.is_none())
     }
 
     /// A NetCDF file that was asked for, if any.
     pub(super) fn series_file(&self) -> Option<&Path> {
         self.grid.as_deref().or(self.wass.as_deref())
     }
-}
-
-fn has_ending(path: &Path, endings: &[&str]) -> bool {
-    let ending = path.extension().map(std::ffi::OsStr::to_ascii_lowercase);
-    ending.is_some_and(|ending| endings.iter().any(|known| ending == *known))
 }
 
 /// A cell for water whose pixels are `pixel_m` wide: about ten of them, rounded to 1, 2 or 5 times a power of ten.
@@ -131,12 +137,12 @@ pub fn given_pose(
 ) -> Result<PoseAtExposure, ReconstructCliError> {
     let [roll_deg, pitch_deg, heading_deg] = attitude_deg;
     for (name, value, low, high, expected) in [
-        ("--roll-deg", roll_deg, -180.0, 180.0, "-180 to 180"),
-        ("--pitch-deg", pitch_deg, -90.0, 90.0, "-90 to 90"),
-        ("--heading-deg", heading_deg, -360.0, 360.0, "-360 to 360"),
-        ("--height-m", height_m, 0.01, 1e4, "0.01 to 10000"),
-        ("--height-sigma-m", height_sigma_m, 0.0, 100.0, "0 to 100"),
-        ("--attitude-sigma-deg", attitude_sigma_deg, 0.0, 90.0, "0 to 90"),
+        ("--roll-deg", roll_deg, -180.0, 180.0, "-180 to 180°"),
+        ("--pitch-deg", pitch_deg, -90.0, 90.0, "-90 to 90°"),
+        ("--heading-deg", heading_deg, -360.0, 360.0, "-360 to 360°"),
+        ("--height-m", height_m, 0.01, 1e4, "0.01 to 10000 m"),
+        ("--height-sigma-m", height_sigma_m, 0.0, 100.0, "0 to 100 m"),
+        ("--attitude-sigma-deg", attitude_sigma_deg, 0.0, 90.0, "0 to 90°"),
     ] {
         // NaN is in no range.
         if !(low..=high).contains(&value) {

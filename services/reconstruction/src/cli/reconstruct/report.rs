@@ -4,11 +4,9 @@ use halcyon_model::{Plane, SurfacePatch};
 use serde::Serialize;
 
 use crate::cli::speed::Spent;
+use crate::core::calibrate::SIGMAS_95;
 use crate::core::cloud::CloudFrame;
 use crate::core::disparity::Disparity;
-
-/// 95 % of a normal variable lie within so many standard deviations.
-const SIGMAS_95: f64 = 1.959_964;
 
 /// One pair.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -33,6 +31,8 @@ pub struct ReconstructReport {
     pub cpu_ms: Option<f64>,
     /// Time of the chain, milliseconds.
     pub wall_ms: f64,
+    /// What makes the result doubtful; mostly empty.
+    pub warnings: Vec<String>,
 }
 
 /// A plane, in the rectified left camera frame.
@@ -118,6 +118,7 @@ impl ReconstructReport {
         patch: &SurfacePatch,
         disparity: &Disparity,
         timing: Spent,
+        warnings: Vec<String>,
     ) -> Self {
         Self {
             engine,
@@ -130,6 +131,7 @@ impl ReconstructReport {
             patch: patch.into(),
             cpu_ms: timing.cpu_ms,
             wall_ms: timing.wall_ms,
+            warnings,
         }
     }
 }

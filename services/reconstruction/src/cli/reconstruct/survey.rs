@@ -5,10 +5,13 @@ use std::path::PathBuf;
 use halcyon_model::{PoseAtExposure, RigCalibration, Stamp, SurfacePatch};
 use serde::Serialize;
 
-use super::{Chain, PatchReport, PlaneReport, ReconstructCliError, ReconstructOptions, read_picture, stereo_pair};
+use super::{
+    Chain, Doubt, Doubts, PatchReport, PlaneReport, ReconstructCliError, ReconstructOptions, check_pose, read_stereo_pair,
+};
 use crate::cli::speed::Spent;
 use crate::core::cloud::CloudFrame;
 use crate::core::reconstruct::Settings;
+use crate::files::check_rig;
 use crate::files::netcdf::Series;
 
 /// One pair of a survey.
@@ -33,6 +36,17 @@ pub struct FailedPair {
     pub name: String,
     /// Why, in one line.
     pub why: String,
+}
+
+/// How far a survey is, and what the last pair gave.
+#[derive(Debug, Clone, Copy)]
+pub struct SurveyStep<'a> {
+    /// Pairs done.
+    pub done: usize,
+    /// Of so many.
+    pub total: usize,
+    /// The last one's patch, or why there is none; `None` before the first.
+    pub outcome: Option<Result<&'a SurfacePatch, &'a FailedPair>>,
 }
 
 /// All pairs, as `--json` prints it.
@@ -60,10 +74,11 @@ pub struct SurveyReport {
     pub cpu_ms: Option<f64>,
     /// Time of the chain, all pairs, milliseconds.
     pub wall_ms: f64,
+    /// What makes the result doubtful, one line a sort; mostly empty.
+    pub warnings: Vec<String>,
 }
 
-/// Reconstructs the pairs of a survey in order. Pairs that make no patch are passed over and listed; `progress` hears
-/// how many of how many are done, and of each failure as it happens.
+/// Reconstructs the pairs of a survey in order. Pairs that make no patch are passed over and listed; `heard` hears of every step.
 ///
 /// # Errors
 /// [`ReconstructCliError`]: bad options, an output that cannot be written, or not one patch.
@@ -71,14 +86,16 @@ pub fn reconstruct_survey(
     calibration: &RigCalibration,
     frames: &[SurveyFrame],
     options: &ReconstructOptions,
-    progress: &mut dyn FnMut(usize, usize, Option<&FailedPair>),
+    heard: &mut dyn FnMut(SurveyStep<'_>),
 ) -> Result<SurveyReport, ReconstructCliError> {
-    options.check_outputs()?;
     for (path, flag) in [(&options.cloud, "--cloud"), (&options.mesh, "--mesh"), (&options.disparity, "--disparity")] {
         if path.is_some() {
             return Err(ReconstructCliError::OnePair(flag));
         }
     }
+    let pictures = frames.iter().flat_map(|frame| [frame.left.as_path(), frame.right.as_path()]);
+    options.check_outputs(pictures.map(|path| ("DIR", path)))?;
+    check_rig(calibration)?;
     // "Without attitude the rig is taken as fixed."
     let fixed_rig = frames.iter().all(|frame| frame.pose.is_none());
     let frame = if fixed_rig { CloudFrame::Plane } else { CloudFrame::Gravity };
@@ -88,33 +105,35 @@ pub fn reconstruct_survey(
         None => None,
     };
     let mut chain = Chain::new(settings, options.cell_m.is_none());
-    let (mut sums, mut failed, mut first_error) = (Sums::default(), Vec::new(), None);
-    progress(0, frames.len(), None);
+    let (mut sums, mut doubts) = (Sums::default(), Doubts::default());
+    let (mut failed, mut first_error) = (Vec::new(), None);
+    let total = frames.len();
+    heard(SurveyStep { done: 0, total, outcome: None });
     for (index, frame) in frames.iter().enumerate() {
-        let outcome = one(&mut chain, calibration, frame, index as u64);
-        let failure = match outcome {
-            Ok((patch, timing)) => {
+        let done = index + 1;
+        match one(&mut chain, calibration, frame, index as u64) {
+            Ok((patch, timing, of_pair)) => {
+                doubts.add(&frame.name, of_pair);
                 if let Some(series) = &mut series {
                     series.push(&patch)?;
                 }
                 sums.add(&patch, timing);
-                None
+                heard(SurveyStep { done, total, outcome: Some(Ok(&patch)) });
             }
             Err(error) => {
                 let failure = FailedPair { name: frame.name.clone(), why: one_line(&error) };
                 first_error.get_or_insert((frame.name.clone(), error));
-                Some(failure)
+                heard(SurveyStep { done, total, outcome: Some(Err(&failure)) });
+                failed.push(failure);
             }
-        };
-        progress(index + 1, frames.len(), failure.as_ref());
-        failed.extend(failure);
+        }
     }
     match (sums.report(chain.engine, frame.name(), frames.len(), failed), first_error) {
         (Some(report), _) => {
             if let Some(series) = &mut series {
                 options.write_series(series, calibration)?;
             }
-            Ok(report)
+            Ok(SurveyReport { warnings: doubts.lines(), ..report })
         }
         (None, Some((name, error))) => Err(ReconstructCliError::NoPatch { pairs: frames.len(), name, source: Box::new(error) }),
         (None, None) => Err(crate::files::netcdf::SeriesError::Empty.into()),
@@ -126,10 +145,12 @@ fn one(
     calibration: &RigCalibration,
     frame: &SurveyFrame,
     sequence: u64,
-) -> Result<(SurfacePatch, Spent), ReconstructCliError> {
-    let (left, right) = (read_picture(&frame.left)?, read_picture(&frame.right)?);
-    let pair = stereo_pair(*calibration, left, right, frame.pose, frame.stamp, sequence)?;
-    Ok(chain.timed(&pair)?)
+) -> Result<(SurfacePatch, Spent, Vec<Doubt>), ReconstructCliError> {
+    let mut doubts = frame.pose.as_ref().map_or(Ok(Vec::new()), |pose| check_pose(pose, calibration))?;
+    let pair = read_stereo_pair(*calibration, [&frame.left, &frame.right], frame.pose, frame.stamp, sequence)?;
+    let (patch, took) = chain.timed(&pair)?;
+    doubts.extend(chain.check(&pair, &patch)?);
+    Ok((patch, took, doubts))
 }
 
 /// An error and its causes on one line.
@@ -202,6 +223,7 @@ impl Sums {
             patch,
             cpu_ms: self.cpu_ms,
             wall_ms: self.wall_ms,
+            warnings: Vec::new(),
         })
     }
 }

@@ -19,7 +19,7 @@ const UNSEEN: u8 = 2 * SLOPE_MAX as u8 + 1;
 /// The best residual must beat all that are not its neighbours by this share, percent.
 const UNIQUENESS_PERCENT: u32 = 10;
 /// The right picture's pixel must choose the same disparity, to so many pixels.
-const LEFT_RIGHT_MAX_PX: i32 = 1;
+const LEFT_RIGHT_MAX_PX: u16 = 1;
 /// Wider windows would overflow their 16-bit sums: 31² · 63 < 2¹⁶.
 const WINDOW_MAX_PX: u32 = 31;
 
@@ -66,10 +66,14 @@ struct Scratch {
     /// For each residual, sums of costs down the columns of the window, and over the window.
     columns: Vec<Vec<u16>>,
     windows: Vec<Vec<u16>>,
-    powers: [Vec<u16>; 2],
     best: Vec<u16>,
     winner: Vec<u16>,
+    /// Costs of the winner's neighbours.
+    below: Vec<u16>,
+    above: Vec<u16>,
     second: Vec<u16>,
+    /// All ones where the right picture agrees.
+    mutual: Vec<u16>,
     /// For each pixel of the right picture, the least cost of any pixel that is matched with it, and at which disparity.
     right_best: Vec<u16>,
     right_px: Vec<i16>,
@@ -85,15 +89,14 @@ impl Scratch {
             columns.resize(width + 2 * half, 0);
         }
         self.windows.iter_mut().for_each(|windows| windows.resize(width, 0));
-        for buffer in [&mut self.best, &mut self.winner, &mut self.second, &mut self.right_best] {
-            buffer.resize(width, 0);
-        }
+        let all = [&mut self.best, &mut self.winner, &mut self.below, &mut self.above, &mut self.second, &mut self.mutual];
+        all.into_iter().chain([&mut self.right_best]).for_each(|buffer| buffer.resize(width, 0));
         self.right_px.resize(width, 0);
     }
 
     fn memory_bytes(&self) -> usize {
         let sums: usize = self.columns.iter().chain(&self.windows).map(Vec::capacity).sum();
-        size_of::<u16>() * (sums + 5 * self.best.capacity()) + self.costs.capacity()
+        size_of::<u16>() * (sums + 8 * self.best.capacity()) + self.costs.capacity()
     }
 }
 
@@ -125,12 +128,16 @@ impl Residual {
 
     /// Takes the slopes of a pair.
     pub(super) fn prepare(&mut self, pair: &Pair<'_>) {
-        for (picture, slopes) in [pair.left, pair.right].into_iter().zip(&mut self.slopes) {
-            slopes.resize(picture.len(), 0);
-            slopes.par_chunks_mut(BAND_ROWS * pair.width).enumerate().for_each(|(band, to)| {
-                slopes_of(picture, pair.width, pair.height, band * BAND_ROWS, to);
-            });
+        let [left, right] = &mut self.slopes;
+        let (width, height) = (pair.width, pair.height);
+        for slopes in [&mut *left, &mut *right] {
+            slopes.resize(width * height, 0);
         }
+        let bands = left.par_chunks_mut(BAND_ROWS * width).zip(right.par_chunks_mut(BAND_ROWS * width)).enumerate();
+        bands.for_each(|(band, (left, right))| {
+            slopes_of(pair.left, width, height, band * BAND_ROWS, left);
+            slopes_of(pair.right, width, height, band * BAND_ROWS, right);
+        });
     }
 
     /// Matches the pair that was prepared within `reach_px` of `plane`; NaN where the winner is doubtful, at an end, or out of `range`.
@@ -199,13 +206,15 @@ impl Job<'_> {
         for (row, to) in to.chunks_exact_mut(self.width).enumerate() {
             let row = first + row as isize;
             self.slide(row + half as isize, true, scratch);
-            let Scratch { columns, windows, powers, .. } = scratch;
+            let Scratch { columns, windows, .. } = scratch;
             for (columns, windows) in columns.iter_mut().zip(windows) {
                 mirror_ends(columns, half);
-                sums(columns, self.window, powers, windows);
+                sums(columns, self.window, windows);
             }
             self.find_runs(row as usize, scratch);
             self.look_back(scratch);
+            self.rank(scratch);
+            self.agree(scratch);
             found = found.plus(self.choose(scratch, to));
             self.slide(row - half as isize, false, scratch);
         }
@@ -298,20 +307,29 @@ impl Job<'_> {
         }
     }
 
-    /// The residual with the least cost for each pixel, with a fraction, where it stands out.
+    /// The residual with the least cost for each pixel, and what it must beat.
     #[inline(always)]
-    fn choose(&self, scratch: &mut Scratch, to: &mut [f32]) -> Found {
+    fn rank(&self, scratch: &mut Scratch) {
         let width = self.width;
-        let Scratch { windows, best, winner, second, runs, right_px, .. } = scratch;
+        let Scratch { windows, best, winner, below, above, second, .. } = scratch;
         let (best, winner, second) = (&mut best[..width], &mut winner[..width], &mut second[..width]);
+        let (below, above) = (&mut below[..width], &mut above[..width]);
         best.fill(u16::MAX);
         winner.fill(0);
+        below.fill(u16::MAX);
+        above.fill(u16::MAX);
         for (residual, costs) in windows.iter().enumerate() {
             let costs = &costs[..width];
+            let before = &windows[residual.saturating_sub(1)][..width];
+            let residual = residual as u16;
             for x in 0..width {
-                let is_less = costs[x] < best[x];
-                best[x] = if is_less { costs[x] } else { best[x] };
-                winner[x] = if is_less { residual as u16 } else { winner[x] };
+                let (cost, follows) = (costs[x], winner[x].wrapping_add(1) == residual);
+                let is_less = cost < best[x];
+                above[x] = if follows { cost } else { above[x] };
+                above[x] = if is_less { u16::MAX } else { above[x] };
+                below[x] = if is_less { before[x] } else { below[x] };
+                best[x] = if is_less { cost } else { best[x] };
+                winner[x] = if is_less { residual } else { winner[x] };
             }
         }
         second.fill(u16::MAX);
@@ -324,30 +342,67 @@ impl Job<'_> {
                 second[x] = if rival < second[x] { rival } else { second[x] };
             }
         }
+    }
+
+    /// Whether the right picture's pixels choose what the left one's do.
+    #[inline(always)]
+    fn agree(&self, scratch: &mut Scratch) {
+        let Scratch { runs, winner, mutual, right_px, .. } = scratch;
+        mutual.fill(0);
+        for residual in -self.reach..=self.reach {
+            let chosen = (residual + self.reach) as u16;
+            for (from, end, whole) in runs.iter() {
+                let shift = whole + residual;
+                let (least, most) = self.partnered(*from, *end, shift);
+                if least >= most {
+                    continue;
+                }
+                let partners = &right_px[(least as i32 - shift) as usize..][..most - least];
+                let left = winner[least..most].iter().zip(&mut mutual[least..most]);
+                let shift = shift as i16;
+                for (partner, (winner, mutual)) in partners.iter().zip(left) {
+                    let agrees = (*winner == chosen) & (partner.wrapping_sub(shift).unsigned_abs() <= LEFT_RIGHT_MAX_PX);
+                    *mutual |= if agrees { u16::MAX } else { 0 };
+                }
+            }
+        }
+    }
+
+    /// The winners that stand out, with a fraction.
+    #[inline(always)]
+    fn choose(&self, scratch: &mut Scratch, to: &mut [f32]) -> Found {
+        let Scratch { best, winner, below, above, second, mutual, runs, .. } = scratch;
         let last = 2 * self.reach as u16;
         let (least_px, most_px) = (self.range.min_px as f32, self.range.max_px as f32);
         let mut found = Found::default();
         for (from, end, whole) in runs.iter() {
-            for x in *from..*end {
-                let is_seen = x as i32 >= *whole && x as i32 - whole < width as i32;
+            let here = *from..*end;
+            let (best, winner, second) = (&best[here.clone()], &winner[here.clone()], &second[here.clone()]);
+            let (below, above, mutual) = (&below[here.clone()], &above[here.clone()], &mutual[here.clone()]);
+            let to = &mut to[here];
+            // Pixels are seen from the one that the right picture begins with up to the one that it ends with.
+            let (first_seen, end_seen) = self.partnered(*from, *end, *whole);
+            let (first_seen, end_seen) = ((first_seen - from) as u32, (end_seen - from) as u32);
+            let base_px = (whole - self.reach) as f32;
+            let (mut matches, mut ends) = (0_u32, 0_u32);
+            for x in 0..to.len() {
+                let is_seen = (x as u32 >= first_seen) & ((x as u32) < end_seen);
                 let is_clear = (100 - UNIQUENESS_PERCENT) * u32::from(second[x]) > 100 * u32::from(best[x]);
-                let is_end = winner[x] == 0 || winner[x] == last;
+                let is_clear = is_clear & (mutual[x] != 0);
+                let is_end = (winner[x] == 0) | (winner[x] == last);
                 // Costs of absolute differences meet at an angle: equal slopes on both sides (Shimizu and Okutomi 2001).
-                let cost_at = |residual: u16| f32::from(windows.get(usize::from(residual)).map_or(u16::MAX, |costs| costs[x]));
-                let (best, below, above) = (f32::from(best[x]), cost_at(winner[x].wrapping_sub(1)), cost_at(winner[x] + 1));
-                let fraction = (below - above) / (2.0 * (below.max(above) - best)).max(1.0);
-                let shift = *whole + i32::from(winner[x]) - self.reach;
-                let value_px = shift as f32 + fraction;
-                let partner = (x as i32 - shift).clamp(0, width as i32 - 1) as usize;
-                let is_mutual = (i32::from(right_px[partner]) - shift).abs() <= LEFT_RIGHT_MAX_PX;
-                let is_clear = is_clear && is_mutual;
-                let is_match = is_seen && is_clear && !is_end && value_px <= x as f32;
-                let is_match = is_match && value_px >= least_px && value_px <= most_px;
+                let (best, below, above) = (f32::from(best[x]), f32::from(below[x]), f32::from(above[x]));
+                let higher = if below > above { below } else { above };
+                let twice = 2.0 * (higher - best);
+                let fraction = (below - above) / if twice > 1.0 { twice } else { 1.0 };
+                let value_px = base_px + f32::from(winner[x]) + fraction;
+                let is_match = is_seen & is_clear & !is_end & (value_px <= (from + x) as f32);
+                let is_match = is_match & (value_px >= least_px) & (value_px <= most_px);
                 to[x] = if is_match { value_px } else { f32::NAN };
-                found.seen += u64::from(is_seen);
-                found.found += u64::from(is_match);
-                found.ends += u64::from(is_seen && is_clear && is_end);
+                matches += u32::from(is_match);
+                ends += u32::from(is_seen & is_clear & is_end);
             }
+            found = found.plus(Found { seen: u64::from(end_seen - first_seen), found: matches.into(), ends: ends.into() });
         }
         found
     }

@@ -4,7 +4,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::*;
 use crate::core::matcher::{Engine, SgbmMode};
-use crate::core::refine::Refiner;
+use crate::core::refine::{Every, Refined, Refiner};
 
 const WIDTH: usize = 320;
 const HEIGHT: usize = 240;
@@ -111,8 +111,9 @@ fn what_sticks_out_is_not_clipped() {
         grey.convert_to(&mut exact, opencv::core::CV_32F, 1.0, 0.0).unwrap();
         exact
     };
-    let mut sigma_px = Vec::new();
-    Refiner::new(11, 2).refine(&exact(&left), &exact(&right), &mut disparity, &mut sigma_px).unwrap();
+    let mut refined = Refined::default();
+    Refiner::new(11, 2, Every::Pixel).refine(&exact(&left), &exact(&right), &disparity, &mut refined).unwrap();
+    let Refined { disparity, sigma_px, .. } = refined;
     let inside = |i: usize| (145..195).contains(&(i % WIDTH)) && (95..155).contains(&(i / WIDTH));
     let on_boat = disparity.values_px.iter().zip(&sigma_px).enumerate().filter(|(i, _)| inside(*i)).map(|(_, pixel)| pixel);
     let is_water = |px: f32, sigma_px: f32| (px - 30.0).abs() < 7.0 && sigma_px <= 0.5;

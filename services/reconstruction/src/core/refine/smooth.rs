@@ -1,11 +1,13 @@
 //! The mean disparity around each pixel.
 
-use crate::core::window::{BAND_ROWS, mirror_ends, mirrored, sums};
+use super::Every;
+use crate::core::window::{BAND_ROWS, mirror_ends, mirrored, sums, sums_of_every_second};
 
 /// A start that differs from the mean around it by more than this, pixels, is left out of that mean.
 const START_SPREAD_MAX_PX: f32 = 1.0;
 
 /// One pass.
+#[derive(Clone, Copy)]
 pub(super) struct Smooth<'a> {
     pub(super) start: &'a [f32],
     /// Means of an earlier pass; with them, what stands out does not count.
@@ -13,6 +15,8 @@ pub(super) struct Smooth<'a> {
     pub(super) width: usize,
     pub(super) height: usize,
     pub(super) window: usize,
+    /// Where means are wanted.
+    pub(super) every: Every,
 }
 
 /// Sums over the columns of the window, and over the window.
@@ -22,12 +26,12 @@ pub(super) struct SmoothScratch {
     totals: Vec<f32>,
     count: Vec<f32>,
     total: Vec<f32>,
-    powers: [Vec<f32>; 2],
+    halves: [Vec<f32>; 2],
 }
 
 impl SmoothScratch {
     pub(super) fn memory_bytes(&self) -> usize {
-        let all = [&self.counts, &self.totals, &self.count, &self.total, &self.powers[0], &self.powers[1]];
+        let all = [&self.counts, &self.totals, &self.count, &self.total, &self.halves[0], &self.halves[1]];
         size_of::<f32>() * all.iter().map(|buffer| buffer.capacity()).sum::<usize>()
     }
 }
@@ -36,13 +40,15 @@ impl Smooth<'_> {
     #[inline(always)]
     pub(super) fn band(&self, band: usize, scratch: &mut SmoothScratch, to: &mut [f32]) {
         let (width, half) = (self.width, self.window / 2);
-        let SmoothScratch { counts, totals, count, total, powers } = scratch;
+        let SmoothScratch { counts, totals, count, total, halves } = scratch;
+        let step = self.every.step_px();
+        let cols = width.div_ceil(step);
         for buffer in [&mut *counts, &mut *totals] {
             buffer.clear();
             buffer.resize(width + 2 * half, 0.0);
         }
-        count.resize(width, 0.0);
-        total.resize(width, 0.0);
+        count.resize(cols, 0.0);
+        total.resize(cols, 0.0);
         let first = (band * BAND_ROWS) as isize;
         // Sums are taken about a disparity of this band: fewer digits are lost.
         let base_px = self.start[band * BAND_ROWS * width..].iter().copied().find(|px| px.is_finite()).unwrap_or(0.0);
@@ -50,18 +56,26 @@ impl Smooth<'_> {
             self.add(row, 1.0, base_px, &mut counts[half..], &mut totals[half..]);
         }
         let least = 0.5 * (self.window * self.window) as f32;
-        for (row, to) in to.chunks_exact_mut(width).enumerate() {
-            let row = first + row as isize;
+        for (row, to) in to.chunks_exact_mut(cols).enumerate() {
+            let row = first + (row * step) as isize;
             self.add(row + half as isize, 1.0, base_px, &mut counts[half..], &mut totals[half..]);
-            mirror_ends(counts, half);
-            mirror_ends(totals, half);
-            sums(counts, self.window, powers, count);
-            sums(totals, self.window, powers, total);
+            for (columns, windows) in [(&mut *counts, &mut *count), (&mut *totals, &mut *total)] {
+                mirror_ends(columns, half);
+                match self.every {
+                    Every::Pixel => sums(columns, self.window, windows),
+                    Every::SecondPixel => sums_of_every_second(columns, self.window, halves, windows),
+                }
+            }
             for (to, (count, total)) in to.iter_mut().zip(count.iter().zip(&*total)) {
                 // At least half of the window must have been matched.
                 *to = if *count >= least { base_px + total / count } else { f32::NAN };
             }
-            self.add(row - half as isize, -1.0, base_px, &mut counts[half..], &mut totals[half..]);
+            for skipped in row..row + step as isize {
+                self.add(skipped - half as isize, -1.0, base_px, &mut counts[half..], &mut totals[half..]);
+                if skipped > row {
+                    self.add(skipped + half as isize, 1.0, base_px, &mut counts[half..], &mut totals[half..]);
+                }
+            }
         }
     }
 

@@ -106,11 +106,11 @@ const PATCH_PX: u32 = 16;
 pub fn row_matches(rectifier: &Rectifier) -> Result<Vec<RowMatch>, FeatureError> {
     let (left, right) = rectifier.grey();
     let (left, right) = (detect_in(left, Method::Orb, KEYPOINTS_MAX)?, detect_in(right, Method::Orb, KEYPOINTS_MAX)?);
-    let (width_px, height_px) = (rectifier.rig().width_px, rectifier.rig().height_px);
+    let width_px = rectifier.rig().width_px;
     let seen = |m: &RowMatch| {
         let (x_px, y_px) = (m.left_x_px.round().max(0.0) as u32, m.left_y_px.round().max(0.0) as u32);
         let disparity_px = (m.left_x_px - m.right_x_px) as f32;
-        x_px < width_px && y_px < height_px && rectifier.is_seen(x_px, y_px, disparity_px, PATCH_PX)
+        x_px < width_px && rectifier.seen(y_px, PATCH_PX).is_some_and(|row| row.has(x_px, disparity_px))
     };
     Ok(match_features(&left, &right, &MatchRule::default())
         .iter()

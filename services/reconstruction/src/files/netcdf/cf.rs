@@ -1,7 +1,7 @@
 //! The CF layout (Climate and Forecast conventions 1.8).
 
 use ::netcdf::{Error, FileMut};
-use halcyon_model::rig_yaml;
+use halcyon_model::{Stamp, rig_yaml};
 
 use super::spool::{Cells, Entry, Spool};
 use super::{About, FillError, describe};
@@ -21,10 +21,11 @@ pub(super) fn fill(file: &mut FileMut, spool: &mut Spool, about: &About) -> Resu
     let Some(first) = spool.entries.first().copied() else { return Ok(()) };
     about_file(file, about, cell_m, spool.frame, has_level)?;
     file.add_unlimited_dimension("time")?;
-    file.add_dimension("north", extent.rows)?;
-    file.add_dimension("east", extent.cols)?;
+    let names = axis_names(is_local);
+    file.add_dimension(names[0], extent.rows)?;
+    file.add_dimension(names[1], extent.cols)?;
     file.add_dimension("axis", 3)?;
-    axes(file, spool, is_local)?;
+    axes(file, spool, is_local, names)?;
     for scalar in scalars(has_level, is_local) {
         let mut variable = file.add_variable::<f64>(scalar.name, &["time"])?;
         variable.set_fill_value(f64::NAN)?;
@@ -33,9 +34,13 @@ pub(super) fn fill(file: &mut FileMut, spool: &mut Spool, about: &About) -> Resu
         variable.put_values(&values, [..values.len()])?;
     }
     normals_and_points(file, spool)?;
-    let since_s = first.stamp.as_nanos().div_euclid(1_000_000_000);
-    times(file, spool, since_s)?;
-    maps(file, spool)
+    times(file, spool, first.stamp)?;
+    maps(file, spool, names)
+}
+
+/// Rows and columns. Where nobody knows where north is, the axes are the picture's, and must not be called anything else.
+fn axis_names(is_local: bool) -> [&'static str; 2] {
+    if is_local { ["north", "east"] } else { ["y", "x"] }
 }
 
 fn about_file(file: &mut FileMut, about: &About, cell_m: f64, frame: CloudFrame, has_level: bool) -> Result<(), Error> {
@@ -48,7 +53,7 @@ fn about_file(file: &mut FileMut, about: &About, cell_m: f64, frame: CloudFrame,
             "The rig stood still: level by the mean of all its planes; the mean level of each patch is the variable level"
         }
         (CloudFrame::Plane, false) => {
-            "No attitude was known: each patch is level by its own mean plane, and north is the top of the left picture"
+            "No attitude was known: each patch is level by its own mean plane, and y points to the top of the left picture"
         }
     };
     for (name, value) in [
@@ -70,15 +75,15 @@ fn about_file(file: &mut FileMut, about: &About, cell_m: f64, frame: CloudFrame,
     Ok(())
 }
 
-fn axes(file: &mut FileMut, spool: &Spool, is_local: bool) -> Result<(), Error> {
+fn axes(file: &mut FileMut, spool: &Spool, is_local: bool, names: [&str; 2]) -> Result<(), Error> {
     let (north_m, east_m) = spool.axes();
-    let names = if is_local {
+    let long_names = if is_local {
         ["distance north of the local origin", "distance east of the local origin"]
     } else {
         ["distance towards the top of the left picture", "distance towards the right of the left picture"]
     };
     // Without `axis`: CF then asks for longitudes and latitudes, and a rig does not know where on Earth its origin is.
-    for (name, long_name, values) in [("north", names[0], &north_m), ("east", names[1], &east_m)] {
+    for (name, long_name, values) in [(names[0], long_names[0], &north_m), (names[1], long_names[1], &east_m)] {
         let mut variable = file.add_variable::<f64>(name, &[name])?;
         describe(&mut variable, &[("long_name", long_name), ("units", "m")])?;
         variable.put_values(values, ..)?;
@@ -194,27 +199,35 @@ fn normals_and_points(file: &mut FileMut, spool: &Spool) -> Result<(), Error> {
     variable.put_values(&values, [..count])
 }
 
-/// Seconds since the whole second of the first patch: exact to a nanosecond over months.
-fn times(file: &mut FileMut, spool: &Spool, since_s: i64) -> Result<(), Error> {
-    let since = jiff::Timestamp::from_second(since_s).unwrap_or_default();
-    let units = format!("seconds since {}", since.strftime("%Y-%m-%d %H:%M:%S"));
+/// Stamps before this (1973) are no date: whoever made them counts from the start of a recording.
+const DATED_S_MIN: i64 = 100_000_000;
+
+/// Seconds since the whole second of the first patch: exact to a nanosecond over months. Without a date they are seconds since the
+/// first patch; without any stamp at all there is no such variable, as CF allows, rather than a time that nobody measured.
+fn times(file: &mut FileMut, spool: &Spool, first: Stamp) -> Result<(), Error> {
+    if spool.entries.iter().all(|entry| entry.stamp == Stamp::default()) {
+        return file.add_attribute("time_comment", "when the pictures were taken is not known").map(|_| ());
+    }
+    let since_s = first.as_nanos().div_euclid(1_000_000_000);
+    let is_dated = since_s >= DATED_S_MIN;
+    let start_ns = if is_dated { since_s.saturating_mul(1_000_000_000) } else { first.as_nanos() };
     let mut variable = file.add_variable::<f64>("time", &["time"])?;
-    describe(
-        &mut variable,
-        &[
-            ("standard_name", "time"),
-            ("long_name", "middle of the exposure (UTC)"),
-            ("units", &units),
-            ("calendar", "standard"),
-            ("axis", "T"),
-        ],
-    )?;
-    let nanos = |entry: &Entry| entry.stamp.as_nanos().saturating_sub(since_s.saturating_mul(1_000_000_000));
+    if is_dated {
+        let since = jiff::Timestamp::from_second(since_s).unwrap_or_default();
+        let units = format!("seconds since {}", since.strftime("%Y-%m-%d %H:%M:%S"));
+        let known = [("standard_name", "time"), ("long_name", "middle of the exposure (UTC)"), ("units", &units)];
+        describe(&mut variable, &known)?;
+        describe(&mut variable, &[("calendar", "standard"), ("axis", "T")])?;
+    } else {
+        let long_name = "middle of the exposure, after that of the first patch; the date is not known";
+        describe(&mut variable, &[("long_name", long_name), ("units", "s")])?;
+    }
+    let nanos = |entry: &Entry| entry.stamp.as_nanos().saturating_sub(start_ns);
     let values: Vec<f64> = spool.entries.iter().map(|entry| nanos(entry) as f64 * 1e-9).collect();
     variable.put_values(&values, [..values.len()])
 }
 
-fn maps(file: &mut FileMut, spool: &mut Spool) -> Result<(), FillError> {
+fn maps(file: &mut FileMut, spool: &mut Spool, names: [&str; 2]) -> Result<(), FillError> {
     let (_, extent) = spool.grid();
     let (rows, cols) = (extent.rows, extent.cols);
     let chunk = [(CHUNK_VALUES / (rows * cols)).clamp(1, spool.entries.len()), rows, cols];
@@ -238,7 +251,7 @@ fn maps(file: &mut FileMut, spool: &mut Spool) -> Result<(), FillError> {
             ],
         ),
     ] {
-        let mut variable = file.add_variable::<f32>(name, &["time", "north", "east"])?;
+        let mut variable = file.add_variable::<f32>(name, &["time", names[0], names[1]])?;
         variable.set_fill_value(f32::NAN)?;
         variable.set_chunking(&chunk)?;
         variable.set_compression(DEFLATE, true)?;

@@ -212,3 +212,31 @@ fn more_times_can_be_appended() {
     let last = file.variable("elevation").unwrap().get_values::<f32, _>(([3, 0, 0], [1, 9, 6])).unwrap();
     assert!(last.iter().all(|value| value.is_nan()));
 }
+
+#[test]
+fn axes_without_north_and_times_without_a_date_claim_neither() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("out.nc");
+    let written = |stamps_ns: &[i64]| {
+        let mut series = Series::beside(&path, CloudFrame::Plane).unwrap();
+        for stamp_ns in stamps_ns {
+            series.push(&patch(*stamp_ns, 0, 0, 4, 3)).unwrap();
+        }
+        series.write_cf(&path, &about()).unwrap();
+        ::netcdf::open(&path).unwrap()
+    };
+    let file = written(&[0]);
+    assert!(file.variable("time").is_none() && file.dimension_len("time") == Some(1));
+    let elevation = file.variable("elevation").unwrap();
+    let names: Vec<String> = elevation.dimensions().iter().map(::netcdf::Dimension::name).collect();
+    assert_eq!(names, ["time", "y", "x"]);
+    let (y, x) = (file.variable("y").unwrap(), file.variable("x").unwrap());
+    assert_eq!((text(&y, "units"), text(&x, "units")), ("m".into(), "m".into()));
+    assert!(text(&y, "long_name").contains("top of the left picture") && file.variable("north").is_none());
+    drop(file);
+    // A recording that counts from its own start.
+    let file = written(&[12_250_000_000, 12_500_000_000]);
+    let time = file.variable("time").unwrap();
+    assert_eq!((time.get_values::<f64, _>(..).unwrap(), text(&time, "units")), (vec![0.0, 0.25], "s".into()));
+    assert!(time.attribute("standard_name").is_none() && time.attribute("calendar").is_none());
+}

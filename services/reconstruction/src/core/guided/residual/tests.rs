@@ -60,8 +60,9 @@ fn plain(
                 let d = (whole(x as usize, y as usize) + winner as i32 - reach) as f32 + fraction;
                 let is_seen = (0..width as i32).contains(&(x as i32 - whole(x as usize, y as usize)));
                 let shift = whole(x as usize, y as usize) + winner as i32 - reach;
-                let partner = (x as i32 - shift).clamp(0, width as i32 - 1) as usize;
-                let is_mutual = chosen_by_right(partner, y as usize).is_some_and(|chosen| (chosen - shift).abs() <= 1);
+                let partner = usize::try_from(x as i32 - shift).ok().filter(|partner| *partner < width);
+                let chosen = partner.and_then(|partner| chosen_by_right(partner, y as usize));
+                let is_mutual = chosen.is_some_and(|chosen| (chosen - shift).abs() <= 1);
                 value = if is_seen && is_mutual && d <= x as f32 && d >= 0.0 { d } else { f32::NAN };
             }
             values.push(value);

@@ -1,0 +1,265 @@
+//! What `halcyon waves` prints: numbers with their units in their names, and 95 % intervals as `x_low` and `x_high`.
+
+use halcyon_ocean::crossing::{Crossing, Wave, WaveStatistics, waves};
+use halcyon_ocean::interval::{Interval, SpectralIntervals, WaveIntervals};
+use halcyon_ocean::quality::{Assessment, Even, Finding};
+use halcyon_ocean::record::RecordError;
+use halcyon_ocean::{Record, SampledSpectrum, Taper, Welch};
+use serde::Serialize;
+
+use super::crests::{CrestReport, crests};
+use crate::table::Readings;
+
+/// A file's waves.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct WavesReport {
+    /// The column of stamps; absent where a rate was stated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time_column: Option<String>,
+    /// The column of elevations.
+    pub value_column: String,
+    /// The unit it was read in.
+    pub unit: &'static str,
+    /// The whole record, or the first burst of several.
+    #[serde(flatten)]
+    pub first: Burst,
+    /// Every burst, where the record was cut.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub bursts: Vec<Burst>,
+}
+
+impl WavesReport {
+    pub(super) fn new(readings: &Readings, mut bursts: Vec<Burst>) -> Self {
+        let first = if bursts.len() == 1 { bursts.remove(0) } else { bursts[0].clone() };
+        Self {
+            time_column: readings.time_column.clone(),
+            value_column: readings.value_column.clone(),
+            unit: readings.unit.as_str(),
+            first,
+            bursts,
+        }
+    }
+}
+
+/// One record that is analysed by itself.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Burst {
+    /// Samples of the even record.
+    pub samples: usize,
+    /// Of these, how many were filled in.
+    pub filled: usize,
+    /// Their rate, hertz.
+    pub rate_hz: f64,
+    /// Stamp of the first, seconds.
+    pub start_s: f64,
+    /// Length, seconds.
+    pub duration_s: f64,
+    /// Mean elevation, metres.
+    pub mean_m: f64,
+    /// Standard deviation about the trend, metres.
+    pub deviation_m: f64,
+    /// Waves from one rise through the trend to the next; absent where there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub zero_up: Option<ZeroCrossing>,
+    /// Waves from one fall through the trend to the next; absent where there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub zero_down: Option<ZeroCrossing>,
+    /// From the spectrum; absent where it holds no energy.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub spectrum: Option<Spectrum>,
+    /// Crests and heights against theories; empty with too few waves.
+    pub crest_statistics: Vec<CrestReport>,
+    /// Every quality test.
+    pub quality: Vec<FlagReport>,
+    /// The density spectrum, for plots.
+    #[serde(skip)]
+    pub density: Option<SampledSpectrum>,
+    /// The elevation without its trend, metres, for plots.
+    #[serde(skip)]
+    pub elevation_m: Vec<f64>,
+    /// The waves, for lists.
+    #[serde(skip)]
+    pub waves: Vec<Wave>,
+}
+
+/// Declares numbers, some of which have 95 % intervals as siblings.
+macro_rules! with_intervals {
+    ($(#[$doc:meta])* $name:ident { $($plain:ident: $type:ty,)* } $($value:ident, $low:ident, $high:ident;)*) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+        #[allow(missing_docs, reason = "as halcyon_ocean has them")]
+        pub struct $name {
+            $(pub $plain: $type,)*
+            $(
+                pub $value: f64,
+                #[serde(skip_serializing_if = "Option::is_none")]
+                pub $low: Option<f64>,
+                #[serde(skip_serializing_if = "Option::is_none")]
+                pub $high: Option<f64>,
+            )*
+        }
+    };
+}
+
+with_intervals! {
+    /// Statistics of single waves; bounds are absent where there are too few waves. Highest wave, crest and trough are facts of the record.
+    ZeroCrossing { waves: usize, h_max_m: f64, crest_max_m: f64, trough_min_m: f64, }
+    h_mean_m, h_mean_m_low, h_mean_m_high;
+    h_rms_m, h_rms_m_low, h_rms_m_high;
+    h_s_m, h_s_m_low, h_s_m_high;
+    h_tenth_m, h_tenth_m_low, h_tenth_m_high;
+    t_z_s, t_z_s_low, t_z_s_high;
+    t_third_s, t_third_s_low, t_third_s_high;
+}
+
+impl ZeroCrossing {
+    fn of(waves: &[Wave]) -> Option<Self> {
+        let found = WaveStatistics::of(waves)?;
+        let bounds = WaveIntervals::of(waves);
+        let low = |pick: fn(&WaveIntervals) -> Interval| bounds.as_ref().map(|bounds| pick(bounds).0);
+        let high = |pick: fn(&WaveIntervals) -> Interval| bounds.as_ref().map(|bounds| pick(bounds).1);
+        Some(Self {
+            waves: found.waves,
+            h_max_m: found.h_max_m,
+            crest_max_m: found.crest_max_m,
+            trough_min_m: found.trough_min_m,
+            h_mean_m: found.h_mean_m,
+            h_mean_m_low: low(|b| b.h_mean_m),
+            h_mean_m_high: high(|b| b.h_mean_m),
+            h_rms_m: found.h_rms_m,
+            h_rms_m_low: low(|b| b.h_rms_m),
+            h_rms_m_high: high(|b| b.h_rms_m),
+            h_s_m: found.h_s_m,
+            h_s_m_low: low(|b| b.h_s_m),
+            h_s_m_high: high(|b| b.h_s_m),
+            h_tenth_m: found.h_tenth_m,
+            h_tenth_m_low: low(|b| b.h_tenth_m),
+            h_tenth_m_high: high(|b| b.h_tenth_m),
+            t_z_s: found.t_z_s,
+            t_z_s_low: low(|b| b.t_z_s),
+            t_z_s_high: high(|b| b.t_z_s),
+            t_third_s: found.t_third_s,
+            t_third_s_low: low(|b| b.t_third_s),
+            t_third_s_high: high(|b| b.t_third_s),
+        })
+    }
+}
+
+/// The frequencies that count as waves.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Band {
+    /// From, hertz.
+    pub low_hz: f64,
+    /// To, hertz.
+    pub high_hz: f64,
+}
+
+with_intervals! {
+    /// Statistics of a spectrum; moments in m² Hzⁿ.
+    Spectrum {
+        band: Band, degrees_of_freedom: Option<f64>, f_p_hz: f64, m_minus1: f64, m0: f64, m1: f64, m2: f64, m3: f64, m4: f64,
+    }
+    h_m0_m, h_m0_m_low, h_m0_m_high;
+    t_p_s, t_p_s_low, t_p_s_high;
+    t_m01_s, t_m01_s_low, t_m01_s_high;
+    t_m02_s, t_m02_s_low, t_m02_s_high;
+    t_e_s, t_e_s_low, t_e_s_high;
+}
+
+impl Spectrum {
+    fn of(record: &Record, density: &SampledSpectrum, (low_hz, high_hz): (f64, f64)) -> Option<Self> {
+        let found = density.statistics(low_hz, high_hz)?;
+        let bounds = SpectralIntervals::of(record, density, &found, (low_hz, high_hz));
+        let moment = |order| density.moment(order, low_hz, high_hz);
+        let low = |pick: fn(&SpectralIntervals) -> Interval| bounds.as_ref().map(|bounds| pick(bounds).0);
+        let high = |pick: fn(&SpectralIntervals) -> Interval| bounds.as_ref().map(|bounds| pick(bounds).1);
+        Some(Self {
+            band: Band { low_hz, high_hz },
+            degrees_of_freedom: bounds.as_ref().map(|bounds| bounds.degrees_of_freedom),
+            f_p_hz: found.f_p_hz,
+            m_minus1: moment(-1),
+            m0: found.m0_m2,
+            m1: moment(1),
+            m2: moment(2),
+            m3: moment(3),
+            m4: moment(4),
+            h_m0_m: found.h_m0_m,
+            h_m0_m_low: low(|b| b.h_m0_m),
+            h_m0_m_high: high(|b| b.h_m0_m),
+            t_p_s: found.t_p_s,
+            t_p_s_low: low(|b| b.t_p_s),
+            t_p_s_high: high(|b| b.t_p_s),
+            t_m01_s: found.t_m01_s,
+            t_m01_s_low: low(|b| b.t_m01_s),
+            t_m01_s_high: high(|b| b.t_m01_s),
+            t_m02_s: found.t_m02_s,
+            t_m02_s_low: low(|b| b.t_m02_s),
+            t_m02_s_high: high(|b| b.t_m02_s),
+            t_e_s: found.t_e_s,
+            t_e_s_low: low(|b| b.t_e_s),
+            t_e_s_high: high(|b| b.t_e_s),
+        })
+    }
+}
+
+/// A quality test's flag.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FlagReport {
+    /// Which test.
+    pub test: &'static str,
+    /// Its number in the QARTOD manual, where it has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub qartod: Option<u8>,
+    /// QARTOD's flag: 1 pass, 2 not evaluated, 3 suspect, 4 fail, 9 missing.
+    pub flag: u8,
+    /// In words.
+    pub reason: String,
+    /// How many readings it concerns.
+    pub readings: usize,
+}
+
+impl From<&Finding> for FlagReport {
+    fn from(finding: &Finding) -> Self {
+        Self {
+            test: finding.test.name(),
+            qartod: finding.test.number(),
+            flag: finding.flag.number(),
+            reason: finding.reason.clone(),
+            readings: finding.samples.len(),
+        }
+    }
+}
+
+impl Burst {
+    pub(super) fn new(
+        even: &Even,
+        assessment: &Assessment,
+        (segment_s, taper): (f64, Taper),
+        band_hz: (f64, f64),
+    ) -> Result<Self, RecordError> {
+        let mean_m = even.record.mean_m();
+        let record = even.record.clone().without_trend();
+        let up = waves(&record, Crossing::Up, 0.0);
+        let density = Welch { taper, ..Welch::with_segments_of_s(segment_s, &record) }.spectrum(&record)?;
+        let band_hz = (band_hz.0, band_hz.1.min(0.5 * record.rate_hz()));
+        let spectrum = Spectrum::of(&record, &density, band_hz);
+        let crest_statistics = spectrum.as_ref().map_or_else(Vec::new, |spectrum| crests(&up, spectrum, &density));
+        Ok(Self {
+            samples: record.samples_m().len(),
+            filled: even.filled.iter().filter(|filled| **filled).count(),
+            rate_hz: record.rate_hz(),
+            start_s: even.start_s,
+            duration_s: record.duration_s(),
+            mean_m,
+            deviation_m: record.variance_m2().sqrt(),
+            zero_up: ZeroCrossing::of(&up),
+            zero_down: ZeroCrossing::of(&waves(&record, Crossing::Down, 0.0)),
+            spectrum,
+            crest_statistics,
+            quality: assessment.findings.iter().map(FlagReport::from).collect(),
+            density: Some(density),
+            waves: up,
+            elevation_m: record.samples_m().to_vec(),
+        })
+    }
+}
