@@ -103,13 +103,14 @@ impl BandFilter {
         fill(&mut level_m, &is_known, self.columns);
         let mut spectrum: Vec<Complex<f64>> = level_m.iter().zip(&self.taper).map(|(z, t)| Complex::new(z * t, 0.0)).collect();
         self.transform(&mut spectrum, [0, 1]);
+        let cells = spectrum.len() as f64;
         let mut vector = vec![Complex::default(); spectrum.len()];
         for row in 0..self.rows {
             let ky = wavenumber_radpm(row, self.rows, self.cell_m);
             for column in 0..self.columns {
                 let kx = wavenumber_radpm(column, self.columns, self.cell_m);
                 let (place, k) = (row * self.columns + column, kx.hypot(ky));
-                spectrum[place] *= self.gain(k) / spectrum.len() as f64;
+                spectrum[place] *= self.gain(k) / cells;
                 // Both components of R are real: one goes into the real part, the other into the imaginary one.
                 if k > 0.0 {
                     vector[place] = spectrum[place] * Complex::new(-ky, kx) / k;

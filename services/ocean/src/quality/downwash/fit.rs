@@ -8,6 +8,10 @@ const BINS: usize = 12;
 const SECTORS: usize = 12;
 /// Least determinant of the normal equations over weight³: ½ where the point is seen from all sides, 0 from one.
 const DETERMINANT_MIN: f64 = 0.03;
+/// Cells that the taper weighs less than this are left out: what leaks from longer waves is largest at the edges.
+const WEIGHT_MIN: f64 = 0.05;
+/// A bin with a smaller share of all weight, in the corners, says nothing of its own.
+const BIN_WEIGHT_MIN: f64 = 0.01;
 
 /// A symmetric 2 × 2 matrix as (xx, √2 xy, yy), so that products of matrices are products of these.
 type Symmetric = [f64; 3];
@@ -91,7 +95,9 @@ impl Sums {
 
     pub(super) fn add(&mut self, band: &Band, weights: &[f64]) {
         for (place, cell) in self.places.iter().enumerate() {
-            let Some((bin, sector, unit)) = cell.filter(|_| band.is_known[place]) else { continue };
+            let Some((bin, sector, unit)) = cell.filter(|_| band.is_known[place] && weights[place] >= WEIGHT_MIN) else {
+                continue;
+            };
             let (weight, riesz) = (weights[place], band.riesz_m[place]);
             let (radial, along) = (outer(unit).map(|x| weight * x), unit[0] * riesz[0] + unit[1] * riesz[1]);
             self.cells[bin * SECTORS + sector].add(&Cell { weight, riesz: outer(riesz), radial, along: along * along });
@@ -103,7 +109,11 @@ impl Sums {
         // The sea's own flow F is the same everywhere; Σ F · u vanishes only if the point is seen evenly, so that F is taken off.
         let (mut sums, mut units, mut weight, mut radial) = ([0.0; 2], [0.0; 2], 0.0, 0.0);
         for (place, cell) in self.places.iter().enumerate() {
-            let Some((_, _, unit)) = cell.filter(|_| before.is_known[place] && now.is_known[place]) else { continue };
+            let Some((_, _, unit)) =
+                cell.filter(|_| before.is_known[place] && now.is_known[place] && weights[place] >= WEIGHT_MIN)
+            else {
+                continue;
+            };
             let change = now.elevation_m[place] - before.elevation_m[place];
             let mean = |i: usize| 0.5 * (before.riesz_m[place][i] + now.riesz_m[place][i]);
             let moved = [change * mean(0), change * mean(1)];
@@ -144,17 +154,17 @@ impl Sums {
         let mean = without.iter().sum::<f64>() / n;
         let sigma = ((n - 1.0) / n * without.iter().map(|s| (s - mean).powi(2)).sum::<f64>()).sqrt();
         let sea_m2 = (sea[0] + sea[2]).max(0.0);
-        let bins = variances
-            .iter()
-            .enumerate()
-            .map(|(bin, (q, _))| {
-                let from_m = self.radius_min_m + bin as f64 * self.width_m;
-                let ring_variance_m2 = q.max(0.0);
-                let all_m2 = ring_variance_m2 + sea_m2;
-                let share = if all_m2 > 0.0 { ring_variance_m2 / all_m2 } else { 0.0 };
-                RingBin { from_m, to_m: from_m + self.width_m, ring_variance_m2, share }
-            })
-            .collect();
+        let mut nearer = 0.0;
+        let bins = variances.iter().enumerate().map(|(bin, (q, weight))| {
+            let from_m = self.radius_min_m + bin as f64 * self.width_m;
+            // Rings go on outwards: a bin that cannot tell is like the one before it.
+            let ring_variance_m2: f64 = if *weight >= BIN_WEIGHT_MIN * all.weight { q.max(0.0) } else { nearer };
+            nearer = ring_variance_m2;
+            let all_m2 = ring_variance_m2 + sea_m2;
+            let share = if all_m2 > 0.0 { ring_variance_m2 / all_m2 } else { 0.0 };
+            RingBin { from_m, to_m: from_m + self.width_m, ring_variance_m2, share }
+        });
+        let bins = bins.collect();
         let share = share(&variances, &all);
         Some(Rings { ring_variance_m2: share * (all.riesz[0] + all.riesz[2]) / all.weight, share, sigma, bins })
     }
