@@ -11,7 +11,7 @@
 //! | [`sampling`] | whether the sampling rate suffices for the waves |
 //! | [`spectral`] | tests 17 and 18, too much energy at high frequencies, test 14 |
 //! | [`bulk`] | tests 15, 19 and 20 of the wave parameters |
-//! | [`assess`] | all of these in one go |
+//! | [`mod@assess`] | all of these in one go |
 //! | [`repair`], [`phase_space`] | what to do about bad readings, and what was done |
 //! | [`downwash`] | ripples that the rotors made, told from waves by their radial pattern |
 

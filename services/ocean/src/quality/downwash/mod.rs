@@ -213,7 +213,7 @@ fn report(
     outward: Option<f64>,
     limits: &DownwashLimits,
 ) -> Downwash {
-    let ring_share_of_all = (found.ring_variance_m2 / all_m2).max(0.0);
+    let ring_share_of_all = (found.ring_variance_m2 / all_m2).clamp(0.0, 1.0);
     let height_m = 4.0 * found.ring_variance_m2.max(0.0).sqrt();
     let sure = found.share - 2.0 * found.sigma;
     let flag = match () {
@@ -232,7 +232,7 @@ fn report(
         _ => "",
     };
     let reason = format!(
-        "rings about the point below hold {:.0} ± {:.0} % of the ripples' variance and {:.0} % of all (4σ of {height_m:.4} m){way}; {:.0} % of the cells masked",
+        "rings about the point below hold {:.0} ± {:.0} % of the ripples' variance and {:.0} % of all (a height 4√m0 of {height_m:.4} m){way}; {:.0} % of the cells masked",
         100.0 * found.share,
         200.0 * found.sigma,
         100.0 * ring_share_of_all,
