@@ -8,12 +8,12 @@
 //! | [`record`] | an evenly sampled record, checked |
 //! | [`crossing`] | zero-crossing analysis: waves, H_m, H_s, H_1/10, H_max, T_z, T_1/3 |
 //! | [`welch`] | Welch's spectrum, H_m0, T_p, T_m01, T_m02, T_e |
-//! | [`crests`] | distributions of crests and heights, the highest of many, observations against them |
 //! | [`height`] | Rayleigh heights, the expected highest wave |
 //! | [`interval`] | 95 % intervals of wave statistics: bootstrap by groups, spectra |
 //! | [`confidence`] | confidence limits of variances |
 //! | [`outlier`] | readings that cannot be, replaced by their neighbour |
 //! | [`quality`] | the QARTOD tests of a record, its repair, rotor ripples |
+//! | [`crests`] | crest and height distributions, the highest wave in time and in space |
 //! | [`filter`], [`spline`] | splitting a record by frequency; uneven samples to even ones |
 //!
 //! Elevation is positive up, metres; densities are one-sided, m²/Hz.

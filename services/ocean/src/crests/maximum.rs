@@ -17,7 +17,7 @@ pub struct Extreme {
 const WAVES_MAX: f64 = 1e12;
 
 /// The highest of `waves` independent waves of a distribution: exceeded with probability 1 − (1 − P)ⁿ. Less than one wave counts as one; NaN as
-/// [10¹²](WAVES_MAX), since not to know how many is not calm.
+/// 10¹², since not to know how many is not calm.
 ///
 /// Successive waves of a narrow band come in groups and are not quite independent: that makes the truth a little lower.
 #[must_use]

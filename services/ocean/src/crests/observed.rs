@@ -44,10 +44,8 @@ pub fn compare(values_m: &[f64], model: &(impl Exceedance + ?Sized), from_m: f64
     values.sort_by(|a, b| b.total_cmp(a));
     let n = values.len() as f64;
     let above = model.exceedance(from_m);
-    let theory: Vec<f64> = values.iter().map(|x| (model.exceedance(*x) / above).min(1.0)).collect();
-    // `min` would make a 1 of what is no number.
-    let is_known = values.iter().all(|x| !model.exceedance(*x).is_nan());
-    if !is_known || above.is_nan() || above <= 0.0 {
+    let theory: Vec<f64> = values.iter().map(|x| (model.exceedance(*x) / above).clamp(0.0, 1.0)).collect();
+    if theory.iter().any(|p| p.is_nan()) || above <= 0.0 {
         return None;
     }
     let points = (1..).zip(values.iter().zip(&theory));

@@ -78,7 +78,7 @@ pub struct NarrowBand {
 impl NarrowBand {
     /// Of spectral lines: frequency, hertz, and variance, m², of each; what is not positive is left out.
     ///
-    /// ψ(τ) = Σ m² cos 2πfτ is followed from 0 in steps of a 128th of the mean period to its first minimum, which is then refined by Newton's method
+    /// ψ(τ) = Σ m² cos 2πfτ is followed from 0 in steps of a 128th of the mean period to its first minimum, which is then refined by bisection
     /// on its slope; `None` where two mean periods show none.
     #[must_use]
     pub fn of(lines: impl IntoIterator<Item = (f64, f64)>) -> Option<Self> {
@@ -100,16 +100,16 @@ impl NarrowBand {
         let step_s = period_s / f64::from(STEPS_PER_PERIOD);
         // The slope starts at 0 and falls; where it first turns positive is the minimum.
         let after = (1..=2 * STEPS_PER_PERIOD).find(|i| slope(f64::from(*i) * step_s) > 0.0)?;
-        let (low_s, high_s) = (f64::from(after - 1) * step_s, f64::from(after) * step_s);
-        let mut t_star_s = 0.5 * (low_s + high_s);
-        for _ in 0..20 {
-            let next_s = t_star_s - slope(t_star_s) / curvature(t_star_s);
-            if next_s.is_nan() {
-                break;
+        let (mut low_s, mut high_s) = (f64::from(after - 1) * step_s, f64::from(after) * step_s);
+        for _ in 0..60 {
+            let middle_s = 0.5 * (low_s + high_s);
+            if slope(middle_s) > 0.0 {
+                high_s = middle_s;
+            } else {
+                low_s = middle_s;
             }
-            // The minimum may lie at an end of the step.
-            t_star_s = next_s.clamp(low_s, high_s);
         }
+        let t_star_s = 0.5 * (low_s + high_s);
         let (psi_star, psi_curvature_star) = (-psi(t_star_s) / variance, curvature(t_star_s).abs() / spread);
         (psi_star > 0.0 && psi_curvature_star > 0.0).then_some(Self { psi_star, psi_curvature_star, t_star_s })
     }

@@ -11,11 +11,13 @@
 //! | [`sampling`] | whether the sampling rate suffices for the waves |
 //! | [`spectral`] | tests 17 and 18, too much energy at high frequencies, test 14 |
 //! | [`bulk`] | tests 15, 19 and 20 of the wave parameters |
-//! | [`assess`] | all of these in one go |
+//! | [`mod@assess`] | all of these in one go |
 //! | [`repair`], [`phase_space`] | what to do about bad readings, and what was done |
+//! | [`downwash`] | ripples that the rotors made, told from waves by their radial pattern |
 
 pub mod assess;
 pub mod bulk;
+pub mod downwash;
 pub mod phase_space;
 pub mod readings;
 pub mod repair;
@@ -114,6 +116,8 @@ pub enum Test {
     Steepness,
     /// Wave parameters that change too fast.
     RateOfChange,
+    /// Ripples that the rotors made.
+    Downwash,
 }
 
 impl Test {
@@ -133,7 +137,7 @@ impl Test {
             Self::EnergyLow => Some(18),
             Self::BulkRange => Some(19),
             Self::RateOfChange => Some(20),
-            Self::Stamps | Self::PercentGood | Self::SamplingRate | Self::EnergyHigh | Self::Steepness => None,
+            Self::Stamps | Self::PercentGood | Self::SamplingRate | Self::EnergyHigh | Self::Steepness | Self::Downwash => None,
         }
     }
 
@@ -158,6 +162,7 @@ impl Test {
             Self::BulkRange => "bulk_range",
             Self::Steepness => "steepness",
             Self::RateOfChange => "rate_of_change",
+            Self::Downwash => "downwash",
         }
     }
 }
