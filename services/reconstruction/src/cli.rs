@@ -4,7 +4,6 @@
 mod calibrate;
 mod compare;
 mod features;
-mod limits;
 mod matching;
 mod options;
 mod reconstruct;
@@ -19,7 +18,6 @@ pub use calibrate::{
 };
 pub use compare::{Matched, THESIS_SIZES_PX, TimeAtSize, compare, refined, times_by_size};
 pub use features::{FeatureRow, FeaturesCliError, FeaturesOptions, FeaturesReport, MissingCloud, PoseReport, features};
-pub use limits::{OutOfRange, within};
 pub use matching::{MatchCliError, MatchReport, TruthReport, match_pair};
 pub use options::{MatchOptions, OptionError};
 pub use reconstruct::{
@@ -34,3 +32,4 @@ pub use self_calibrate::{
 pub use speed::{Spent, Threads, median, median_spent, spent};
 
 pub use crate::core::rig_budget::DISPARITY_SIGMA_PX;
+pub use crate::limits::OutOfRange;

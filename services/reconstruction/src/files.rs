@@ -28,7 +28,7 @@ use container::Trouble;
 pub use glob::{GlobError, glob};
 pub use grey::{Grey, Samples};
 pub use outputs::{Output, OutputError, check_outputs, has_ending};
-pub use rig::{ImpossibleRig, RigFileError, check_rig, read_rig, rig_files, write_rig, write_ros};
+pub use rig::{RigFileError, check_rig, read_rig, rig_files, write_rig, write_ros};
 pub use truth::read_truth;
 
 /// Larger files are no pictures of a stereo rig.

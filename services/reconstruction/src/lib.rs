@@ -22,6 +22,7 @@ pub mod cli;
 mod config;
 pub mod core;
 pub mod files;
+mod limits;
 
 pub use actor::run;
 pub use config::Config;

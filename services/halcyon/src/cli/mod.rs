@@ -20,6 +20,7 @@ mod waves;
 
 use std::process::ExitCode;
 
+use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 use halcyon_chassis::{Options, process};
 
@@ -73,8 +74,10 @@ enum Command {
 pub fn main() -> ExitCode {
     let Cli { options, command } = match Cli::try_parse() {
         Ok(cli) => cli,
-        // Help and version are no errors, and are printed as they are.
-        Err(error) if !error.use_stderr() => error.exit(),
+        // Help and version are no errors, and are printed as they are; so is the help for whoever says nothing.
+        Err(error) if !error.use_stderr() || error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
+            error.exit()
+        }
         Err(error) => return process::fail(&halcyon_chassis::ConfigError::new(usage::one_line(&error)).into()),
     };
     let outcome = match command {

@@ -8,9 +8,6 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 /// taken comes from a shell that expanded a pattern; then that is said.
 pub(super) fn one_line(error: &clap::Error) -> String {
     let text = error.render().to_string();
-    if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
-        return format!("a subcommand is missing; see '{} --help'", program(&text));
-    }
     let says = text.split("\n\nUsage:").next().unwrap_or_default().split("\n\nFor more information").next().unwrap_or_default();
     let says = says.strip_prefix("error: ").unwrap_or(says);
     let parts: Vec<&str> = says.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
@@ -69,7 +66,6 @@ mod tests {
         assert!(value.contains("invalid value 'wide' for '--width <PX>'"), "{value}");
         let choice = line(&["reconstruct", "--mesh-of", "sand"]);
         assert!(choice.contains("'sand'") && choice.contains("cloud, grid"), "{choice}");
-        assert!(line(&["sim"]).starts_with("a subcommand is missing; see 'halcyon sim"));
         assert!(line(&["frobnicate"]).contains("unrecognized subcommand"));
     }
 

@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use halcyon_model::{Image, RigCalibration};
 
-use super::limits::{OutOfRange, within};
 use crate::core::calibrate::{BoardSpec, CalibrateError, Calibration, Options, calibrate_with, camera_infos};
 use crate::files::{
     FileError, GlobError, Output, RigFileError, check_outputs, glob, read_pair, read_rig, rig_files, write_rig, write_ros,
 };
+use crate::limits::{OutOfRange, within};
 
 mod report;
 

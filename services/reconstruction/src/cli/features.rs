@@ -7,7 +7,6 @@ use halcyon_model::{Image, RigCalibration};
 use nalgebra::{Matrix3, Matrix3x4, Vector3};
 use serde::Serialize;
 
-use super::limits::{OutOfRange, within};
 use crate::core::epipolar::{
     PointPair, RansacSettings, Rays, essential_from_fundamental, essential_from_pose, pixels_without_distortion,
     pose_from_essential, projection_matrices, triangulate,
@@ -16,6 +15,7 @@ use crate::core::features::{
     FeatureError, FeatureStudy, KEYPOINTS_MAX, MatchRule, Method, StudySettings, UnknownMethod, encode_png, study,
 };
 use crate::files::{FileError, Output, RigFileError, check_outputs, read_picture, read_rig, rig_files, write_bytes};
+use crate::limits::{OutOfRange, within};
 
 /// Why there are no features.
 #[derive(Debug, thiserror::Error)]

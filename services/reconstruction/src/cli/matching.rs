@@ -5,7 +5,6 @@ use std::path::Path;
 use halcyon_model::Image;
 use serde::Serialize;
 
-use super::limits::{OutOfRange, within};
 use super::options::{MatchOptions, OptionError};
 use super::speed::{Spent, spent};
 use super::texture::without_texture;
@@ -14,6 +13,7 @@ use crate::core::disparity::score::{Score, SizeError, score};
 use crate::core::disparity::{colour, pfm};
 use crate::core::matcher::{DisparityRange, Engine, MatchError, UnknownEngine, match_images};
 use crate::files::{FileError, Output, check_outputs, has_ending, read_pair, read_truth, write_bytes};
+use crate::limits::{OutOfRange, within};
 
 /// Why there is no disparity map.
 #[derive(Debug, thiserror::Error)]

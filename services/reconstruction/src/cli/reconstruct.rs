@@ -23,7 +23,8 @@ use crate::core::matcher::UnknownEngine;
 use crate::core::mesh;
 use crate::core::reconstruct::{ReconstructError, Reconstructor, Settings, WorldFromRectified};
 use crate::files::netcdf::{About, Series, SeriesError};
-use crate::files::{FileError, ImpossibleRig, RigFileError, has_ending, ply, read_picture, read_rig, rig_files, write_bytes};
+use crate::files::{FileError, RigFileError, has_ending, ply, read_picture, read_rig, rig_files, write_bytes};
+use crate::limits::OutOfRange;
 
 /// Why there is no patch.
 #[derive(Debug, thiserror::Error)]
@@ -63,7 +64,7 @@ pub enum ReconstructCliError {
     },
     /// The calibration of a survey.
     #[error("rig.yaml is no calibration of a rig")]
-    ImpossibleRig(#[from] ImpossibleRig),
+    ImpossibleRig(#[from] OutOfRange),
     /// A pose or a plane that no camera over water has.
     #[error(transparent)]
     Impossible(#[from] ImpossibleError),
@@ -225,7 +226,7 @@ impl Chain {
     /// Refuses a plane that is none of water; says what is unlikely about one.
     fn check(&self, pair: &StereoPair, patch: &SurfacePatch) -> Result<Vec<Doubt>, ImpossibleError> {
         let Some(rig) = self.reconstructor.rectified_rig() else { return Ok(Vec::new()) };
-        check_plane(&patch.plane, pair.pose.as_ref(), &pair.calibration, rig)
+        check_plane(patch, pair.pose.as_ref(), &pair.calibration, rig)
     }
 
     /// How far the water is, and so how large a cell suits, only a first reconstruction tells; its own grid may well fail.

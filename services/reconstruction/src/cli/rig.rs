@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use super::limits::{OutOfRange, within};
 use crate::core::reconstruct::Settings;
 use crate::core::rectify::{Rectifier, RectifyError};
 use crate::core::rig_budget::{Best, Budget, LENGTH_PER_HEIGHT, RigGeometry, RigGeometryError};
 use crate::files::{RigFileError, read_rig};
+use crate::limits::{OutOfRange, within};
 
 /// The highest wave that was ever measured is about 30 m.
 const WAVE_HEIGHT_M: [f64; 2] = [1e-4, 40.0];

@@ -4,13 +4,13 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::limits::{OutOfRange, within};
 use crate::core::calibrate::SIGMAS_95;
 use crate::core::features::{FeatureError, MatchRule, Method, UnknownMethod, match_pictures};
 use crate::core::self_calibrate::{Scale, SelfCalibrateError, SelfCalibration, Settings, Solver, self_calibrate as calibrate};
 use crate::files::{
     FileError, GlobError, Output, RigFileError, check_outputs, glob, read_picture, read_rig, rig_files, write_rig,
 };
+use crate::limits::{OutOfRange, within};
 
 /// Keypoints of each picture: enough to cover it, few enough to compare each with each.
 const KEYPOINTS_MAX: usize = 2000;

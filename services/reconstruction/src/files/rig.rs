@@ -7,6 +7,7 @@ use halcyon_model::camera_info::{self, CameraInfo};
 use halcyon_model::rig_yaml::{self, RigYamlError};
 
 use super::{FileError, read_bytes, write_bytes};
+use crate::limits::{OutOfRange, within};
 
 /// Names of ROS's two files in their folder.
 pub(super) const ROS_FILES: [&str; 2] = ["left.yaml", "right.yaml"];
@@ -33,19 +34,8 @@ pub enum RigFileError {
         path: PathBuf,
         /// Which number.
         #[source]
-        source: ImpossibleRig,
+        source: OutOfRange,
     },
-}
-
-/// A number of a calibration that no rig has.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{what} must be {low} to {high} {unit}, not {value}")]
-pub struct ImpossibleRig {
-    what: &'static str,
-    value: f64,
-    low: f64,
-    high: f64,
-    unit: &'static str,
 }
 
 /// A focal length of 0.05 to 100 widths of the picture: from wider than any fisheye to the longest lens.
@@ -58,27 +48,24 @@ const MOUNT_M_MAX: f64 = 100.0;
 /// Refuses what is a calibration by its form, but of no rig: a decimal point lost, millimetres for metres, or nonsense.
 ///
 /// # Errors
-/// [`ImpossibleRig`], naming the number and its unit.
-pub fn check_rig(rig: &RigCalibration) -> Result<(), ImpossibleRig> {
-    let within = |what, value: f64, [low, high]: [f64; 2], unit| {
-        // NaN is in no range.
-        if (low..=high).contains(&value) { Ok(()) } else { Err(ImpossibleRig { what, value, low, high, unit }) }
-    };
+/// [`OutOfRange`], naming the number and its unit.
+pub fn check_rig(rig: &RigCalibration) -> Result<(), OutOfRange> {
+    let within = |what, value: f64, [low, high]: [f64; 2], unit| within(what, value, low, high, unit);
     let (width_px, height_px) = (f64::from(rig.width_px), f64::from(rig.height_px));
-    let focal_px = FOCAL_WIDTHS.map(|widths| widths * width_px.max(height_px));
+    let focal_px = FOCAL_WIDTHS.map(|widths| (widths * width_px.max(height_px)).round());
     // The sensor may sit beside the axis, as in a lens that shifts, but not by more than its own side.
     let beside = |side_px: f64| [-side_px, 2.0 * side_px];
     for (names, camera) in [
         (["the left camera's fx", "the left camera's fy", "the left camera's cx", "the left camera's cy"], &rig.left),
         (["the right camera's fx", "the right camera's fy", "the right camera's cx", "the right camera's cy"], &rig.right),
     ] {
-        within(names[0], camera.fx_px, focal_px, "px")?;
-        within(names[1], camera.fy_px, focal_px, "px")?;
-        within(names[2], camera.cx_px, beside(width_px), "px")?;
-        within(names[3], camera.cy_px, beside(height_px), "px")?;
+        within(names[0], camera.fx_px, focal_px, " px")?;
+        within(names[1], camera.fy_px, focal_px, " px")?;
+        within(names[2], camera.cx_px, beside(width_px), " px")?;
+        within(names[3], camera.cy_px, beside(height_px), " px")?;
     }
-    within("the baseline |T|", rig.baseline_m(), BASELINE_M, "m (T is in metres)")?;
-    within("the camera's place |camera_in_body_m|", rig.camera_in_body_m.norm(), [0.0, MOUNT_M_MAX], "m")
+    within("the baseline |T|", rig.baseline_m(), BASELINE_M, " m")?;
+    within("the camera's place |camera_in_body_m|", rig.camera_in_body_m.norm(), [0.0, MOUNT_M_MAX], " m")
 }
 
 /// Reads a rig: `path` is an OpenCV YAML file, or a folder with ROS's `left.yaml` and `right.yaml`.
@@ -165,7 +152,7 @@ mod tests {
         check(&|r| r.right.fy_px = 1e-3, "right camera's fy");
         check(&|r| r.right.cx_px = f64::NAN, "right camera's cx must be -640 to 1280 px");
         check(&|r| r.left.cy_px = 1e6, "left camera's cy");
-        check(&|r| r.right_from_left_m.x = -920.0, "the baseline |T| must be 0.001 to 100 m (T is in metres), not 920");
+        check(&|r| r.right_from_left_m.x = -920.0, "the baseline |T| must be 0.001 to 100 m, not 920 m");
         check(&|r| r.right_from_left_m.x = -1e-9, "baseline");
         check(&|r| r.camera_in_body_m.z = f64::INFINITY, "camera_in_body_m");
     }

@@ -1,7 +1,7 @@
 //! Poses and planes that no camera over water has are refused, unlikely ones warned of: they come from a sign, a unit or a picture
 //! of something else, and every number made from them would look like a measurement.
 
-use halcyon_model::{Plane, PoseAtExposure, RigCalibration};
+use halcyon_model::{PoseAtExposure, RigCalibration, SurfacePatch};
 use nalgebra::Vector3;
 
 use crate::core::reconstruct::WorldFromRectified;
@@ -18,8 +18,11 @@ const TILT_DEG_MAX: f64 = 30.0;
 const TILT_DEG_USUAL: f64 = 10.0;
 /// Without a pose all that is known is that the camera sees the plane's surface: closer to edge-on there is none to see.
 const OBLIQUE_DEG_MAX: f64 = 80.0;
-/// Points that scatter about their plane by more than this share of its distance are no water below a camera.
-const RMS_SHARE_USUAL: f64 = 0.1;
+/// Rigs on shores and masts look down more steeply than this.
+const OBLIQUE_DEG_USUAL: f64 = 60.0;
+/// The mean plane takes out what is longer than the footprint. Waves that fit into it have a height of at most 0.142 of their length
+/// (Michell 1893), and a sine's root mean square is its height over 2 √2: points on water do not scatter more.
+const RMS_SHARE_MAX: f64 = 0.142 * 0.5 * std::f64::consts::FRAC_1_SQRT_2;
 /// A height that differs from what the pair shows by more than this share, and by more than its own uncertainty, is another's.
 const HEIGHT_SHARE_USUAL: f64 = 0.2;
 /// Below this disparity, pixels, a pixel's error is the whole distance.
@@ -81,8 +84,10 @@ pub(super) enum Doubt {
         "by the height that was given the left camera is {given_m:.2} m above the water, by the pictures {seen_m:.2} m: one of them, or the rig, is wrong"
     )]
     Height { given_m: f64, seen_m: f64 },
-    #[error("the points scatter {rms_m:.2} m RMS about a plane {distance_m:.2} m away: unlikely for water")]
-    Scatter { rms_m: f64, distance_m: f64 },
+    #[error(
+        "the points scatter {rms_m:.2} m RMS over {extent_m:.1} m: waves so steep would break, so this is noise or no water"
+    )]
+    Scatter { rms_m: f64, extent_m: f64 },
 }
 
 /// The doubts of many pairs, one line for each sort.
@@ -144,11 +149,12 @@ fn camera_height_m(pose: &PoseAtExposure, calibration: &RigCalibration) -> f64 {
 /// # Errors
 /// [`ImpossibleError`]
 pub(super) fn check_plane(
-    plane: &Plane,
+    patch: &SurfacePatch,
     pose: Option<&PoseAtExposure>,
     calibration: &RigCalibration,
     rig: &RectifiedRig,
 ) -> Result<Vec<Doubt>, ImpossibleError> {
+    let plane = &patch.plane;
     let angle_deg = |cosine: f64| cosine.clamp(-1.0, 1.0).acos().to_degrees();
     let mut doubts = Vec::new();
     if let Some(pose) = pose {
@@ -171,19 +177,20 @@ pub(super) fn check_plane(
         if oblique_deg > OBLIQUE_DEG_MAX {
             return Err(ImpossibleError::EdgeOn { oblique_deg });
         }
-        if oblique_deg > OFF_NADIR_DEG_USUAL {
+        if oblique_deg > OBLIQUE_DEG_USUAL {
             doubts.push(Doubt::EdgeOn { oblique_deg });
         }
     }
-    if plane.rms_m > RMS_SHARE_USUAL * plane.distance_m {
-        doubts.push(Doubt::Scatter { rms_m: plane.rms_m, distance_m: plane.distance_m });
+    let extent_m = patch.grid.cell_m * f64::from(patch.grid.rows).hypot(f64::from(patch.grid.cols));
+    if plane.rms_m > RMS_SHARE_MAX * extent_m {
+        doubts.push(Doubt::Scatter { rms_m: plane.rms_m, extent_m });
     }
     Ok(doubts)
 }
 
 #[cfg(test)]
 mod tests {
-    use halcyon_model::CameraIntrinsics;
+    use halcyon_model::{CameraIntrinsics, ElevationGrid, Plane, RigId, Stamp};
     use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 
     use super::*;
@@ -243,7 +250,33 @@ mod tests {
         let rig = *Rectifier::new(&calibration).unwrap().rig();
         let plane = |tilt_deg: f64, rms_m| {
             let normal = Rotation3::from_euler_angles(f64::to_radians(tilt_deg), 0.0, 0.0) * Vector3::z();
-            Plane { normal, distance_m: 5.0, rms_m }
+            // Four by three metres.
+            let grid = ElevationGrid {
+                south_west_north_m: 0.0,
+                south_west_east_m: 0.0,
+                cell_m: 1.0,
+                rows: 4,
+                cols: 3,
+                elevation_m: vec![0.0; 12],
+                sigma_m: vec![0.01; 12],
+            };
+            SurfacePatch {
+                stamp: Stamp::default(),
+                rig: RigId::new("rig").unwrap(),
+                sequence: 0,
+                grid,
+                coverage: 1.0,
+                plane: Plane { normal, distance_m: 5.0, rms_m },
+                points: 1000,
+                level_m: None,
+                level_sigma_m: None,
+                level_thesis_m: None,
+                error_length_m: 0.1,
+                slope_removed: [0.0; 2],
+                slope_sigma: 0.0,
+                attitude_sigma_rad: 0.0,
+                processing_s: 0.0,
+            }
         };
         let check = |tilt_deg, pose: Option<&PoseAtExposure>| check_plane(&plane(tilt_deg, 0.01), pose, &calibration, &rig);
         let level = pose(0.0, 0.0, 5.0);
@@ -272,6 +305,9 @@ mod tests {
         doubts.add("c", check(75.0, None).unwrap());
         let lines = doubts.lines();
         assert!(lines[0].starts_with("a: ") && lines[0].ends_with("(2 pairs so)") && lines[1].starts_with("c: "), "{lines:?}");
-        assert!(check_plane(&plane(0.0, 0.6), None, &calibration, &rig).unwrap()[0].to_string().contains("scatter 0.60 m RMS"));
+        // 5 m of diagonal hold waves of at most 0.142 × 5 m / (2 √2) = 0.251 m RMS.
+        let steep = |rms_m| check_plane(&plane(0.0, rms_m), None, &calibration, &rig).unwrap();
+        assert!(steep(0.26)[0].to_string().contains("scatter 0.26 m RMS over 5.0 m"));
+        assert_eq!(steep(0.24), []);
     }
 }

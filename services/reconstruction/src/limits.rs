@@ -1,4 +1,4 @@
-//! Numbers out of range, refused before any work, with the option and the unit.
+//! Numbers out of range, refused with the option or the quantity and the unit.
 
 /// A number that cannot be.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -20,7 +20,12 @@ pub struct OutOfRange {
 
 /// A number with its unit; what is no number has none.
 fn shown(value: f64, unit: &str) -> String {
-    if value.is_finite() { format!("{value}{unit}") } else { value.to_string() }
+    match value.abs() {
+        size if !size.is_finite() => value.to_string(),
+        // Nobody counts three hundred digits.
+        size if size >= 1e9 => format!("{value:e}{unit}"),
+        _ => format!("{value}{unit}"),
+    }
 }
 
 impl OutOfRange {
@@ -35,7 +40,7 @@ impl OutOfRange {
 ///
 /// # Errors
 /// [`OutOfRange`]
-pub fn within(name: &'static str, value: f64, low: f64, high: f64, unit: &'static str) -> Result<(), OutOfRange> {
+pub(crate) fn within(name: &'static str, value: f64, low: f64, high: f64, unit: &'static str) -> Result<(), OutOfRange> {
     if (low..=high).contains(&value) {
         return Ok(());
     }
@@ -50,7 +55,9 @@ mod tests {
     fn the_ends_are_within_and_nan_is_not() {
         assert!(within("--cell", 1.0, 1.0, 2.0, " m").is_ok() && within("--cell", 2.0, 1.0, 2.0, " m").is_ok());
         let refused = |value| within("--cell", value, 1.0, 2.0, " m").unwrap_err().to_string();
-        for (value, text) in [(f64::NAN, "NaN"), (f64::INFINITY, "inf"), (f64::NEG_INFINITY, "-inf"), (0.999, "0.999 m")] {
+        for (value, text) in
+            [(f64::NAN, "NaN"), (f64::INFINITY, "inf"), (f64::NEG_INFINITY, "-inf"), (0.999, "0.999 m"), (-1e308, "-1e308 m")]
+        {
             assert_eq!(refused(value), format!("--cell must be 1 to 2 m, not {text}"));
         }
     }
