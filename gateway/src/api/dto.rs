@@ -22,7 +22,9 @@ pub use mission::{
     Approval, CreateMission, Mission, MissionAbilities, MissionPhase, MissionTransition, PointInput, Possibility,
 };
 pub use plan::{LandingClearance, Plan, PlanAssignment, PlanTask};
-pub use sea::{Estimate, SeaState, TraceSample, Verdict, VerdictCheck, VerdictState};
+pub use sea::{
+    Calm, CalmWindow, Directional, Estimate, QualityFlag, SeaState, Spectrum, TraceSample, Verdict, VerdictCheck, VerdictState,
+};
 pub use service::{Event, HealthState, Readiness, ReadinessCheck, Service, Severity};
 pub use stream::{Heartbeat, Hello, StreamMessage};
 pub use surface::{Preview, Series, SeriesSample, Surface, WaveHeightSample};

@@ -88,6 +88,7 @@ pub fn routes() -> OpenApiRouter<App> {
         .routes(routes!(rigs::preview_left))
         .routes(routes!(rigs::preview_disparity))
         .routes(routes!(rigs::series))
+        .routes(routes!(rigs::spectrum))
         .routes(routes!(plan::show))
         .routes(routes!(services::list))
         .routes(routes!(events::list))

@@ -11,7 +11,7 @@ use halcyon_model::RigId;
 use serde::Deserialize;
 use utoipa::IntoParams;
 
-use super::dto::{Preview, Series, SeriesSample, Surface, WaveHeightSample, rfc3339};
+use super::dto::{Preview, Series, SeriesSample, Spectrum, Surface, WaveHeightSample, rfc3339};
 use super::extract::{Asked, Id};
 use super::problem::ApiError;
 use crate::app::App;
@@ -135,4 +135,15 @@ pub async fn series(
         elevation: elevation.collect(),
         h_s: h_s.collect(),
     }))
+}
+
+/// The spectrum of the newest sea state, with its 95 % interval.
+#[utoipa::path(get, path = "/api/v1/rigs/{id}/spectrum", tag = "sea", operation_id = "show_spectrum",
+    params(("id" = String, Path, pattern = "^[A-Za-z0-9._-]{1,64}$")), responses((status = 200, body = Spectrum)))]
+pub async fn spectrum(State(app): State<App>, Id(rig): Id<RigId>) -> Result<Json<Spectrum>, ApiError> {
+    let now = app.now();
+    let fleet = app.store.read();
+    let none = || ApiError::NotFound(format!("rig {rig} has measured no spectrum"));
+    let sea = fleet.sea_states.get(&rig).ok_or_else(none)?;
+    Spectrum::new(&sea.value, &fleet.edge(now)).map(Json).ok_or_else(none)
 }

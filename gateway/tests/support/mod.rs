@@ -250,11 +250,23 @@ pub fn sea_state(rig: &str, age_s: f64, valid_for_s: f64) -> SeaState {
         h_m0_m: None,
         t_z_s: None,
         slope_rms_rad: None,
+        h_rms_m: None,
+        h_tenth_m: None,
+        t_p_s: None,
+        t_m01_s: None,
+        t_m02_s: None,
+        t_e_s: None,
+        vertical_speed_rms_mps: None,
+        directional: None,
+        spectrum: None,
+        quality: Vec::new(),
+        calm: None,
         trace: (0..5)
             .map(|step| TracePoint { stamp: at(-age_s - 4.0 + f64::from(step)), elevation_m: f64::from(step) })
             .collect(),
         verdict: Verdict {
             state: VerdictState::Safe,
+            probability: None,
             reasons: vec![VerdictReason { check: "significant_height".into(), passed: true, text: "low".into() }],
             valid_until: at(-age_s + valid_for_s),
         },

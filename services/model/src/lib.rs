@@ -39,7 +39,9 @@ pub use geo::{Geodetic, LocalFrame, LocalPoint};
 pub use id::{FleetId, IdError, InstanceId, MissionId, RigId, VehicleId};
 pub use mission::{Approval, Mission, MissionPhase, MissionSpec, Transition};
 pub use plan::{Assignment, Clearance, DispatchPlan, Slot, Task};
-pub use sea::{Estimate, SeaState, TracePoint, Verdict, VerdictReason, VerdictState};
+pub use sea::{
+    CalmForecast, CalmWindow, Directional, Estimate, QualityFlag, SeaState, TracePoint, Verdict, VerdictReason, VerdictState, WaveSpectrum,
+};
 pub use service::{Event, Health, HealthState, Severity};
 pub use stereo::{
     CameraIntrinsics, ElevationGrid, Image, Plane, PoseAtExposure, Preview, RigCalibration, StereoPair, SurfacePatch,

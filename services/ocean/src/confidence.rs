@@ -31,6 +31,14 @@ pub fn variance_factors_95(dof: f64) -> (f64, f64) {
     (dof / chi_square_quantile(0.975, dof), dof / chi_square_quantile(0.025, dof))
 }
 
+/// Probability that a standard normal variable is under `z`; NaN for NaN.
+#[must_use]
+pub fn normal_cumulative(z: f64) -> f64 {
+    // z² is chi-square with one degree of freedom.
+    let within = gamma_p(0.5, 0.5 * z * z);
+    if z < 0.0 { 0.5 * (1.0 - within) } else { 0.5 * (1.0 + within) }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -55,6 +63,15 @@ mod tests {
         }
         let normal_limit = variance_factors_95(1e5);
         assert_relative_eq!(normal_limit.1, 1.0 + 1.96 * (2e-5f64).sqrt(), max_relative = 1e-3);
+    }
+
+    /// Tables of the normal distribution.
+    #[test]
+    fn the_normal_distribution_is_the_published_one() {
+        for (z, expected) in [(0.0, 0.5), (1.0, 0.841_344_746), (-1.0, 0.158_655_254), (1.959_963_985, 0.975), (-3.0, 0.001_349_898)] {
+            assert_relative_eq!(normal_cumulative(z), expected, max_relative = 1e-6);
+        }
+        assert_eq!((normal_cumulative(f64::INFINITY), normal_cumulative(f64::NEG_INFINITY)), (1.0, 0.0));
     }
 
     #[test]

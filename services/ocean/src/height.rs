@@ -10,6 +10,9 @@ pub const H_MEAN_OVER_ROOT_M0: f64 = 2.506_628_274_631_000_2;
 /// H_rms over √m0: √8.
 pub const H_RMS_OVER_ROOT_M0: f64 = 2.828_427_124_746_190_3;
 
+/// H_1/10 over √m0: √8 (√ln 10 + 10 × ∫ exp(−x²) dx from √ln 10) = 5.09….
+pub const H_TENTH_OVER_ROOT_M0: f64 = 5.090_937_09;
+
 /// Expected highest of `waves` successive waves, over H_s.
 ///
 /// The exact mean of the highest of n Rayleigh heights, E[H_max]/H_rms = ∫ 1 − (1 − exp(−x²))ⁿ dx, for any real n; less than one
@@ -40,13 +43,15 @@ mod tests {
 
     #[test]
     fn the_constants_are_their_integrals() {
-        // Upper third by quadrature of the Rayleigh density 2x exp(−x²), for H/H_rms.
-        let from = 3f64.ln().sqrt();
-        let n = 100_000;
-        let step = (8.0 - from) / f64::from(n);
-        let third: f64 =
-            (0..n).map(|i| from + (f64::from(i) + 0.5) * step).map(|x| 3.0 * x * 2.0 * x * (-x * x).exp() * step).sum();
-        assert_relative_eq!(third * 8f64.sqrt(), H_S_OVER_ROOT_M0, max_relative = 1e-8);
+        // Upper third and tenth by quadrature of the Rayleigh density 2x exp(−x²), for H/H_rms.
+        let upper = |share: f64| -> f64 {
+            let from = share.ln().sqrt();
+            let n = 100_000;
+            let step = (8.0 - from) / f64::from(n);
+            (0..n).map(|i| from + (f64::from(i) + 0.5) * step).map(|x| share * x * 2.0 * x * (-x * x).exp() * step).sum()
+        };
+        assert_relative_eq!(upper(3.0) * 8f64.sqrt(), H_S_OVER_ROOT_M0, max_relative = 1e-8);
+        assert_relative_eq!(upper(10.0) * 8f64.sqrt(), H_TENTH_OVER_ROOT_M0, max_relative = 1e-6);
         assert_relative_eq!(H_MEAN_OVER_ROOT_M0, (2.0 * std::f64::consts::PI).sqrt());
     }
 

@@ -98,6 +98,13 @@ pub struct SampledSpectrum {
 }
 
 impl SampledSpectrum {
+    /// From densities at 0, `df_hz`, 2 `df_hz`, …, m²/Hz; `None` unless `df_hz` is positive and every density finite and not negative.
+    #[must_use]
+    pub fn new(df_hz: f64, density_m2_per_hz: Vec<f64>) -> Option<Self> {
+        let valid = df_hz > 0.0 && df_hz.is_finite() && density_m2_per_hz.iter().all(|density| (0.0..f64::MAX).contains(density));
+        valid.then_some(Self { df_hz, density_m2_per_hz })
+    }
+
     /// Distance between two frequencies, hertz.
     #[must_use]
     pub fn df_hz(&self) -> f64 {

@@ -16,8 +16,7 @@ const TICK: Duration = Duration::from_millis(500);
 
 /// Assesses one rig's patches until told to stop.
 ///
-/// Patches are taken in the order of their arrival; those that come faster than they are used are replaced by newer ones on
-/// the way. A restart forgets the window.
+/// Patches that come faster than they are used are replaced by newer ones on the way; one that comes late takes its place in time. A restart forgets the window.
 ///
 /// # Errors
 /// If the configuration has no valid rig, or the bus is gone.
@@ -62,6 +61,7 @@ fn reject(error: &PatchError) {
         PatchError::OtherRig { .. } => "other_rig",
         PatchError::OutOfOrder { .. } => "out_of_order",
         PatchError::Duplicate { .. } => "duplicate",
+        PatchError::Crowded { .. } => "crowded",
         PatchError::Future { .. } => "future",
         PatchError::Late { .. } => "late",
         PatchError::Shape { .. } => "shape",

@@ -20,4 +20,4 @@ mod actor;
 mod config;
 
 pub use actor::run;
-pub use config::Config;
+pub use config::{Airframe, AirframeConfig, Config, PROFILES};

@@ -158,6 +158,7 @@ impl Survey {
             centre,
             verdict: VerdictReport {
                 state: sea.verdict.state.as_str(),
+                probability: sea.verdict.probability,
                 reasons: reasons.collect(),
                 valid_until: seconds(sea.verdict.valid_until),
             },

@@ -6,13 +6,15 @@ use serde::Serialize;
 
 use super::Burst;
 use crate::config::Config;
-use crate::core::{Evidence, Statistics, judge};
+use crate::core::{Evidence, Judgement, Statistics, judge};
 
 /// A verdict, as `--json` prints it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct VerdictReport {
     /// `safe`, `unsafe` or `inconclusive`.
     pub state: &'static str,
+    /// That the water is under every limit, by the measurement; `null` where it cannot be trusted.
+    pub probability: Option<f64>,
     /// Every check in words, those that failed first.
     pub reasons: Vec<ReasonReport>,
     /// Seconds of the record's stamps after which it means nothing.
@@ -45,9 +47,11 @@ pub fn verdict(burst: &Burst, config: &Config) -> VerdictReport {
         interval_s: Some(1.0 / burst.rate_hz),
         footprint_m: 0.0,
         hidden_m: Some(0.0),
+        // They come with the burst, and their words go first below.
+        quality: Vec::new(),
         statistics: statistics(burst),
     };
-    let (mut state, reasons) = judge(&evidence, config, VerdictState::Inconclusive);
+    let Judgement { mut state, reasons, mut probability } = judge(&evidence, config, VerdictState::Inconclusive);
     let checks = reasons.into_iter().filter(|reason| !OF_PATCHES.contains(&reason.check.as_str()));
     let checks = checks.map(|reason| ReasonReport { check: reason.check, passed: reason.passed, text: reason.text });
     let failed = burst.quality.iter().filter(|flag| flag.flag >= 4);
@@ -55,10 +59,11 @@ pub fn verdict(burst: &Burst, config: &Config) -> VerdictReport {
     let mut reasons: Vec<ReasonReport> = failed.collect();
     if !reasons.is_empty() {
         state = VerdictState::Inconclusive;
+        probability = None;
     }
     reasons.extend(checks);
     let valid_until = burst.start_s + burst.duration_s + config.validity_s;
-    VerdictReport { state: state.as_str(), reasons, valid_until }
+    VerdictReport { state: state.as_str(), probability, reasons, valid_until }
 }
 
 /// `None` without waves.
@@ -82,6 +87,9 @@ fn statistics(burst: &Burst) -> Option<Statistics> {
         h_s_m: estimate(up.h_s_m, up.h_s_m_low, up.h_s_m_high),
         h_max_m: Estimate { value: up.h_max_m, low: up.h_max_m, high: up.h_max_m },
         h_m0_m,
+        h_rms_m: estimate(up.h_rms_m, up.h_rms_m_low, up.h_rms_m_high),
+        h_tenth_m: estimate(up.h_tenth_m, up.h_tenth_m_low, up.h_tenth_m_high),
+        spectral: None,
         t_z_s: Some(estimate(up.t_z_s, up.t_z_s_low, up.t_z_s_high)),
         slope_rms_rad: Some(Estimate { value: slope, low: share(h_m0_m.low), high: share(h_m0_m.high) }),
     })

@@ -4,9 +4,10 @@ use halcyon_model::{IdError, LocalPoint, RigId, SeaState, Stamp, SurfacePatch, V
 
 use super::hidden::{Hidden, hidden};
 use super::patch::{self, PatchError};
+use super::quality;
 use super::series::Series;
 use super::statistics::Statistics;
-use super::verdict::{Evidence, judge};
+use super::verdict::{Evidence, Judgement, judge};
 use super::window::Window;
 use crate::config::Config;
 
@@ -34,11 +35,11 @@ impl Assessor {
         Ok(Self { config, rig, window: Window::default(), assessed: None, issued: None, verdict })
     }
 
-    /// Takes in one patch. A sea state comes out once in `period_s` of patch time.
+    /// Takes in one patch, at its place in time if it comes late or out of order. A sea state comes out once in `period_s` of patch time.
     ///
     /// # Errors
-    /// [`PatchError`] for a patch that is damaged, of another rig, late, early, or not newer than the newest. Nothing that was
-    /// known is lost by it.
+    /// [`PatchError`] for a patch that is damaged, of another rig, older than allowed, early, there already, or nearly. Nothing that
+    /// was known is lost by it.
     pub fn observe(&mut self, patch: &SurfacePatch, now: Stamp) -> Result<Option<SeaState>, PatchError> {
         let config = &self.config;
         patch::check(patch, &self.rig, now, config.clock_skew_s_max, config.patch_age_s_max)?;
@@ -46,10 +47,17 @@ impl Assessor {
             if newest.seconds_since(now) > config.clock_skew_s_max {
                 // The clock was set back (a simulation began anew): what was seen before has no place in its time.
                 self.forget();
-            } else if patch.stamp == newest {
-                return Err(PatchError::Duplicate { sequence: patch.sequence });
-            } else if patch.stamp < newest {
+            } else if newest.seconds_since(patch.stamp) > config.window_s {
                 return Err(PatchError::OutOfOrder { sequence: patch.sequence, behind_s: newest.seconds_since(patch.stamp) });
+            } else {
+                for neighbour in self.window.neighbours(patch.stamp).into_iter().flatten() {
+                    let apart_s = neighbour.seconds_since(patch.stamp).abs();
+                    if apart_s == 0.0 {
+                        return Err(PatchError::Duplicate { sequence: patch.sequence });
+                    } else if apart_s < patch::APART_S_MIN {
+                        return Err(PatchError::Crowded { sequence: patch.sequence, apart_s });
+                    }
+                }
             }
         }
         self.window.add(patch, self.config.window_s, self.config.spot_radius_m, self.config.slope_baseline_m);
@@ -88,7 +96,8 @@ impl Assessor {
             passed: false,
             text: format!("no surface patch for {silent_s:.1} s, at most {:.1} s allowed", self.config.stale_s),
         };
-        Some(self.report(now, now, position, None, None, (VerdictState::Inconclusive, vec![reason])))
+        let judgement = Judgement { state: VerdictState::Inconclusive, reasons: vec![reason], probability: None };
+        Some(self.report(now, now, position, None, None, judgement))
     }
 
     /// Time since the newest patch, seconds; `None` before the first.
@@ -113,7 +122,7 @@ impl Assessor {
         let measured = interval_s.map(|interval_s| {
             let hidden = hidden(&self.window, &self.config, interval_s);
             let series = Series::new(&self.window, &hidden, self.config.gap_s_max.max(2.0 * interval_s));
-            let statistics = Statistics::of(&self.window, &series, &hidden, interval_s);
+            let statistics = Statistics::of(&self.window, &series, &hidden, interval_s, self.config.wave_hz_min);
             (hidden, series, statistics)
         });
         let (hidden, series, statistics) = measured.map_or((None, None, None), |(h, s, t)| (Some(h), Some(s), t));
@@ -128,11 +137,15 @@ impl Assessor {
                 Some(Hidden::Measured { h_m0_m, .. }) => Some(h_m0_m),
                 Some(Hidden::Unknown) | None => None,
             },
+            quality: match (&series, &statistics) {
+                (Some(series), Some(statistics)) => quality::flags(series, statistics.above_noise),
+                _ => Vec::new(),
+            },
             statistics,
         };
-        let verdict = judge(&evidence, &self.config, self.verdict);
-        self.verdict = verdict.0;
-        Some(self.report(now, newest, position, series.as_ref(), evidence.statistics.as_ref(), verdict))
+        let judgement = judge(&evidence, &self.config, self.verdict);
+        self.verdict = judgement.state;
+        Some(self.report(now, newest, position, series.as_ref(), Some(&evidence), judgement))
     }
 
     /// Puts a sea state together. Its verdict holds for `validity_s` after `measured`.
@@ -142,9 +155,12 @@ impl Assessor {
         measured: Stamp,
         position: LocalPoint,
         series: Option<&Series>,
-        statistics: Option<&Statistics>,
-        (state, reasons): (VerdictState, Vec<VerdictReason>),
+        evidence: Option<&Evidence>,
+        judgement: Judgement,
     ) -> SeaState {
+        let statistics = evidence.and_then(|evidence| evidence.statistics.as_ref());
+        let spectral = statistics.and_then(|s| s.spectral.as_ref());
+        let Judgement { state, reasons, probability } = judgement;
         let frames = self.window.frames();
         let (start, end) = (frames.front().map_or(measured, |f| f.stamp), frames.back().map_or(measured, |f| f.stamp));
         SeaState {
@@ -162,8 +178,19 @@ impl Assessor {
             h_m0_m: statistics.map(|s| s.h_m0_m),
             t_z_s: statistics.and_then(|s| s.t_z_s),
             slope_rms_rad: statistics.and_then(|s| s.slope_rms_rad),
+            h_rms_m: statistics.map(|s| s.h_rms_m),
+            h_tenth_m: statistics.map(|s| s.h_tenth_m),
+            t_p_s: spectral.map(|s| s.t_p_s),
+            t_m01_s: spectral.map(|s| s.t_m01_s),
+            t_m02_s: spectral.map(|s| s.t_m02_s),
+            t_e_s: spectral.map(|s| s.t_e_s),
+            vertical_speed_rms_mps: statistics.map(Statistics::vertical_speed_rms_mps),
+            directional: None,
+            spectrum: spectral.map(|s| s.spectrum.clone()),
+            quality: evidence.map_or_else(Vec::new, |e| e.quality.clone()),
+            calm: None,
             trace: series.map_or_else(Vec::new, Series::trace),
-            verdict: Verdict { state, reasons, valid_until: measured.plus_secs_f64(self.config.validity_s) },
+            verdict: Verdict { state, probability, reasons, valid_until: measured.plus_secs_f64(self.config.validity_s) },
         }
     }
 }

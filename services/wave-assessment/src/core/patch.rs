@@ -2,6 +2,9 @@
 
 use halcyon_model::{ElevationGrid, RigId, Stamp, SurfacePatch};
 
+/// Least time between two patches, seconds.
+pub(crate) const APART_S_MIN: f64 = 0.005;
+
 /// Why a patch was not used. The window is as it was.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PatchError {
@@ -15,15 +18,23 @@ pub enum PatchError {
         /// The rig assessed here.
         expected: RigId,
     },
-    /// Not newer than the newest.
-    #[error("surface patch {sequence} is {behind_s:.3} s older than the newest")]
+    /// Older than the window is long.
+    #[error("surface patch {sequence} is {behind_s:.3} s older than the newest, more than the window holds")]
     OutOfOrder {
         /// Its number.
         sequence: u64,
         /// By how much.
         behind_s: f64,
     },
-    /// Of the same instant as the newest.
+    /// Closer to another than any camera takes pairs: the window would fill with seconds.
+    #[error("surface patch {sequence} is only {apart_s:.6} s from another, less than {APART_S_MIN} s")]
+    Crowded {
+        /// Its number.
+        sequence: u64,
+        /// Time between the two.
+        apart_s: f64,
+    },
+    /// Of the same instant as another.
     #[error("surface patch {sequence} came twice")]
     Duplicate {
         /// Its number.

@@ -27,6 +27,8 @@ pub(crate) struct Stretch {
     pub times_s: Vec<f64>,
     /// Best estimate of the elevation, metres.
     pub elevation_m: Vec<f64>,
+    /// The same before outliers were replaced and the mean was taken off, metres.
+    pub raw_m: Vec<f64>,
     /// The same with all that may be hidden waves in it, metres.
     pub elevation_upper_m: Vec<f64>,
 }
@@ -93,7 +95,7 @@ impl Series {
 
     /// Adds one run of readings; returns its length in seconds, 0 where it is too short.
     fn add(&mut self, window: &Window, hidden: &Hidden, slot: usize, run: &[(usize, f64)], level: usize) -> f64 {
-        let mut stretch = Stretch { slot, times_s: Vec::new(), elevation_m: Vec::new(), elevation_upper_m: Vec::new() };
+        let mut stretch = Stretch { slot, times_s: Vec::new(), elevation_m: Vec::new(), raw_m: Vec::new(), elevation_upper_m: Vec::new() };
         let mut noise_m2 = 0.0;
         for (i, time_s) in run {
             let Some(reading) = window.frames()[*i].readings[slot] else { continue };
@@ -108,6 +110,7 @@ impl Series {
         if duration_s < STRETCH_S_MIN || stretch.times_s.len() < SAMPLES_MIN {
             return 0.0;
         }
+        stretch.raw_m.clone_from(&stretch.elevation_m);
         self.replaced += despike(&mut stretch.elevation_m, &mut stretch.elevation_upper_m);
         center(&mut stretch.elevation_m);
         center(&mut stretch.elevation_upper_m);

@@ -4,16 +4,22 @@
 //! measurement does: estimates and lower bounds are less the readings' own noise, upper bounds are not, and hold all that may be waves
 //! hidden by the footprint. So they err to the side of too high.
 
+use std::f64::consts::TAU;
+
 use halcyon_model::Estimate;
 use halcyon_ocean::confidence::variance_factors_95;
 use halcyon_ocean::crossing::{Crossing, Wave, WaveStatistics, waves};
-use halcyon_ocean::height::{H_MEAN_OVER_ROOT_M0, H_S_OVER_ROOT_M0, expected_highest_over_h_s};
-use halcyon_ocean::{Record, Spline};
+use halcyon_ocean::dispersion::wavelength_m;
+use halcyon_ocean::height::{
+    H_MEAN_OVER_ROOT_M0, H_RMS_OVER_ROOT_M0, H_S_OVER_ROOT_M0, H_TENTH_OVER_ROOT_M0, expected_highest_over_h_s,
+};
+use halcyon_ocean::{Depth, Record, Spline};
 
 use super::gauge::GAUGES;
 use super::hidden::Hidden;
 use super::sampling::degrees_of_freedom;
 use super::series::Series;
+use super::spectrum::Spectral;
 use super::window::Window;
 
 /// Series are drawn this many times as dense as the patches before crests are looked for.
@@ -40,13 +46,17 @@ pub(crate) struct Statistics {
     pub h_s_m: Estimate,
     pub h_max_m: Estimate,
     pub h_m0_m: Estimate,
+    pub h_rms_m: Estimate,
+    pub h_tenth_m: Estimate,
     pub t_z_s: Option<Estimate>,
     pub slope_rms_rad: Option<Estimate>,
+    /// `None` where there are too few samples, or no waves above the noise.
+    pub spectral: Option<Spectral>,
 }
 
 impl Statistics {
     /// Of a window; `None` where no gauge has a series.
-    pub(crate) fn of(window: &Window, series: &Series, hidden: &Hidden, interval_s: f64) -> Option<Self> {
+    pub(crate) fn of(window: &Window, series: &Series, hidden: &Hidden, interval_s: f64, wave_hz_min: f64) -> Option<Self> {
         if series.samples == 0 {
             return None;
         }
@@ -94,26 +104,64 @@ impl Statistics {
             h_s_m: height(|f| f.h_s_m, H_S_OVER_ROOT_M0),
             h_max_m: scale.observed(counts.iter().map(|c| c.h_max_m).fold(0.0, f64::max), all.len()),
             h_m0_m: scale.height(4.0 * variance_m2.sqrt(), freedom),
+            h_rms_m: height(|f| f.h_rms_m, H_RMS_OVER_ROOT_M0),
+            h_tenth_m: height(|f| f.h_tenth_m, H_TENTH_OVER_ROOT_M0),
             t_z_s,
+            spectral: if above_noise { Spectral::of(series, interval_s, wave_hz_min) } else { None },
             slope_rms_rad: slope(window, freedom),
         })
     }
 
-    /// Expected highest wave during `landing_s`, over a Rayleigh sea of H_s and T_z.
-    ///
-    /// Without a period the waves are taken to be as short as they come (half a second), which makes the most of them.
-    pub(crate) fn highest_m(&self, landing_s: f64) -> Estimate {
+    /// Mean period, or where there is none that of the shortest waves (half a second): it makes the most of them, and the fastest.
+    pub(crate) fn period_s(&self) -> Estimate {
         const PERIOD_S_MIN: f64 = 0.5;
-        let period = self.t_z_s.unwrap_or(Estimate { value: PERIOD_S_MIN, low: PERIOD_S_MIN, high: PERIOD_S_MIN });
-        let of = |h_s_m: f64, t_z_s: f64| h_s_m * expected_highest_over_h_s(landing_s / t_z_s);
-        let h_s_m = self.significant_m();
-        Estimate { value: of(h_s_m.value, period.value), low: of(h_s_m.low, period.high), high: of(h_s_m.high, period.low) }
+        self.t_z_s.unwrap_or(Estimate { value: PERIOD_S_MIN, low: PERIOD_S_MIN, high: PERIOD_S_MIN })
+    }
+
+    /// Expected highest wave during `landing_s`, over a Rayleigh sea of H_s and T_z.
+    pub(crate) fn highest_m(&self, landing_s: f64) -> Estimate {
+        self.per_period(self.significant_m(), |h_s_m, t_z_s| h_s_m * expected_highest_over_h_s(landing_s / t_z_s))
+    }
+
+    /// Root mean square vertical speed of the surface, metres per second: 2π √m0/T_z.
+    pub(crate) fn vertical_speed_rms_mps(&self) -> Estimate {
+        self.per_period(self.h_m0_m, |h_m0_m, t_z_s| 0.25 * h_m0_m * TAU / t_z_s)
+    }
+
+    /// Expected fastest rise of the surface during `landing_s`, metres per second.
+    pub(crate) fn rise_mps(&self, landing_s: f64) -> Estimate {
+        self.per_period(self.vertical_speed_rms_mps(), |rms_mps, t_z_s| rms_mps * amplitude_over_rms(landing_s / t_z_s))
+    }
+
+    /// Expected steepest tilt of the water during `landing_s`, radians; `None` where the slope is not known. As if all slopes lay in one
+    /// direction, which makes the most of them.
+    pub(crate) fn tilt_rad(&self, landing_s: f64) -> Option<Estimate> {
+        let steepest = |rms: f64, t_z_s: f64| (rms * amplitude_over_rms(landing_s / t_z_s)).atan();
+        self.slope_rms_rad.map(|rms| self.per_period(rms, steepest))
+    }
+
+    /// Length of waves of the mean period, metres, in deep water: in shallow water they are shorter.
+    pub(crate) fn wavelength_m(&self) -> Estimate {
+        let Estimate { value, low, high } = self.period_s();
+        let length_m = |period_s: f64| wavelength_m(period_s, Depth::DEEP);
+        Estimate { value: length_m(value), low: length_m(low), high: length_m(high) }
+    }
+
+    /// Of something that falls with the period: its bounds with the further end of the period's interval.
+    fn per_period(&self, of: Estimate, f: impl Fn(f64, f64) -> f64) -> Estimate {
+        let period = self.period_s();
+        Estimate { value: f(of.value, period.value), low: f(of.low, period.high), high: f(of.high, period.low) }
     }
 
     /// H_s for the verdict: from single waves, but bounded by 4 √m0 too, which short or noisy waves do not drag down.
     pub(crate) fn significant_m(&self) -> Estimate {
         Estimate { high: self.h_s_m.high.max(self.h_m0_m.high), ..self.h_s_m }
     }
+}
+
+/// Expected highest of so many amplitudes of a narrow Gaussian process, over its root mean square: half of a highest wave's.
+fn amplitude_over_rms(waves: f64) -> f64 {
+    0.5 * H_S_OVER_ROOT_M0 * expected_highest_over_h_s(waves)
 }
 
 /// Variances behind the heights, m²: as estimated, with all that may be waves, and the readings' own noise; and the height, metres,

@@ -53,8 +53,7 @@ pub(crate) struct Window {
 }
 
 impl Window {
-    /// Adds a checked patch that is newer than all before, and drops what is older than `window_s` or further than
-    /// `spot_radius_m` from it.
+    /// Adds a checked patch at its place in time, and drops what is older than `window_s` or further than `spot_radius_m` from the newest.
     pub(crate) fn add(&mut self, patch: &SurfacePatch, window_s: f64, spot_radius_m: f64, slope_baseline_m: f64) {
         let grid = &patch.grid;
         let (height_m, width_m) = (f64::from(grid.rows - 1) * grid.cell_m, f64::from(grid.cols - 1) * grid.cell_m);
@@ -77,12 +76,22 @@ impl Window {
             frozen: fingerprint.is_some() && fingerprint == self.fingerprint,
         };
         self.fingerprint = fingerprint;
-        self.frames
-            .retain(|old| patch.stamp.seconds_since(old.stamp) <= window_s && old.centre.distance_m(&centre) <= spot_radius_m);
-        if self.frames.len() >= FRAMES_MAX {
+        let place = self.frames.partition_point(|old| old.stamp < frame.stamp);
+        self.frames.insert(place, frame);
+        if let Some((newest, centre)) = self.newest().map(|frame| (frame.stamp, frame.centre)) {
+            self.frames
+                .retain(|old| newest.seconds_since(old.stamp) <= window_s && old.centre.distance_m(&centre) <= spot_radius_m);
+        }
+        if self.frames.len() > FRAMES_MAX {
             self.frames.pop_front();
         }
-        self.frames.push_back(frame);
+    }
+
+    /// Stamps of the frames next to `stamp`, before and after; one at `stamp` itself counts as after.
+    pub(crate) fn neighbours(&self, stamp: Stamp) -> [Option<Stamp>; 2] {
+        let place = self.frames.partition_point(|old| old.stamp < stamp);
+        let at = |index: Option<usize>| index.and_then(|index| self.frames.get(index)).map(|frame| frame.stamp);
+        [at(place.checked_sub(1)), at(Some(place))]
     }
 
     pub(crate) fn frames(&self) -> &VecDeque<Frame> {

@@ -1,8 +1,12 @@
 //! `[wave_assessment]`
 
+mod airframe;
+
 use halcyon_chassis::Section;
 use halcyon_model::RigId;
 use serde::{Deserialize, Serialize};
+
+pub use airframe::{Airframe, AirframeConfig, PROFILES};
 
 /// What is measured over how long, and what water is calm enough.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -43,6 +47,8 @@ pub struct Config {
     pub slope_baseline_m: f64,
     /// Largest significant wave height to land on, metres.
     pub h_s_m_max: f64,
+    /// Largest mean of the highest tenth of the waves, metres.
+    pub h_tenth_m_max: f64,
     /// Largest expected highest wave during the landing, metres.
     pub h_highest_m_max: f64,
     /// Largest root mean square slope, radians.
@@ -51,6 +57,8 @@ pub struct Config {
     pub landing_s: f64,
     /// The bounds must be this share under the limits to become safe, and reach the limits to stop being so.
     pub hysteresis: f64,
+    /// What has to land.
+    pub airframe: AirframeConfig,
 }
 
 impl Default for Config {
@@ -73,10 +81,12 @@ impl Default for Config {
             wave_hz_min: 0.08,
             slope_baseline_m: 0.4,
             h_s_m_max: 0.15,
+            h_tenth_m_max: 0.20,
             h_highest_m_max: 0.30,
             slope_rms_rad_max: 0.12,
             landing_s: 20.0,
             hysteresis: 0.1,
+            airframe: AirframeConfig::default(),
         }
     }
 }
@@ -104,10 +114,12 @@ impl Section for Config {
         within("wave_hz_min", self.wave_hz_min, 0.0, 10.0)?;
         within("slope_baseline_m", self.slope_baseline_m, 0.01, 10.0)?;
         within("h_s_m_max", self.h_s_m_max, 0.001, 20.0)?;
+        within("h_tenth_m_max", self.h_tenth_m_max, 0.001, 40.0)?;
         within("h_highest_m_max", self.h_highest_m_max, 0.001, 40.0)?;
         within("slope_rms_rad_max", self.slope_rms_rad_max, 0.001, 1.5)?;
         within("landing_s", self.landing_s, 1.0, 3600.0)?;
-        within("hysteresis", self.hysteresis, 0.0, 0.9)
+        within("hysteresis", self.hysteresis, 0.0, 0.9)?;
+        self.airframe.resolved().map(drop)
     }
 }
 

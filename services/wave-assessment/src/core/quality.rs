@@ -1,0 +1,46 @@
+//! Quality tests of the window's readings (QARTOD), as flags.
+
+use halcyon_model::QualityFlag;
+use halcyon_ocean::quality::{Flag, Limits, RawSeries, Test, assess};
+
+use super::gauge::CENTRE;
+use super::series::Series;
+
+/// Findings that are no reason to distrust the rest: gaps break series, and what is left is judged by itself; bad readings are counted by the
+/// check of outliers; how steep the sea is, is what the verdict is about.
+const REPORTED_ONLY: [Test; 4] = [Test::Gap, Test::Spike, Test::PercentGood, Test::Stamps];
+
+/// What did not pass at the central gauge, or at the one that saw the most where that one saw less than half of it. Where nothing stands out
+/// of the noise (`above_noise`), tests of waves have nothing to test.
+pub(crate) fn flags(series: &Series, above_noise: bool) -> Vec<QualityFlag> {
+    let samples = |slot: usize| series.stretches.iter().filter(|s| s.slot == slot).map(|s| s.times_s.len()).sum::<usize>();
+    let Some(best) = series.stretches.iter().map(|s| s.slot).max_by_key(|slot| samples(*slot)) else { return Vec::new() };
+    let slot = if 2 * samples(CENTRE) >= samples(best) { CENTRE } else { best };
+    let of_slot = || series.stretches.iter().filter(|s| s.slot == slot);
+    let stamp_s: Vec<f64> = of_slot().flat_map(|s| &s.times_s).copied().collect();
+    let elevation_m: Vec<f64> = of_slot().flat_map(|s| &s.raw_m).copied().collect();
+    let found = assess(RawSeries { stamp_s: &stamp_s, elevation_m: &elevation_m }, &Limits::default());
+    found
+        .complaints()
+        .filter(|finding| above_noise || !of_waves(finding.test))
+        .map(|finding| QualityFlag {
+            test: finding.test.name().into(),
+            failed: matches!(finding.flag, Flag::Fail) && !REPORTED_ONLY.contains(&finding.test),
+            text: finding.reason.clone(),
+        })
+        .collect()
+}
+
+/// Whether a test is of waves, and not of readings.
+fn of_waves(test: Test) -> bool {
+    matches!(
+        test,
+        Test::SamplingRate
+            | Test::OperationalFrequency
+            | Test::EnergyLow
+            | Test::EnergyHigh
+            | Test::BulkRange
+            | Test::Steepness
+            | Test::SegmentShift
+    )
+}

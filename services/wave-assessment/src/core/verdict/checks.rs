@@ -1,0 +1,143 @@
+//! Checks, gathered one by one.
+
+use halcyon_model::{Estimate, VerdictReason, VerdictState};
+
+/// How a check ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Outcome {
+    /// The measurement itself cannot be trusted: nothing follows from it, not even that the water is rough.
+    Untrusted,
+    /// Known not to be as it should.
+    Over,
+    /// Not known to be.
+    Failed,
+    /// As it should be.
+    Passed,
+}
+
+/// What the checks so far say.
+#[derive(Debug)]
+pub(super) struct Checks {
+    made: Vec<(Outcome, VerdictReason)>,
+    previous: VerdictState,
+    hysteresis: f64,
+    /// The smallest probability of any quantity to be under its limit.
+    probability: Option<f64>,
+}
+
+impl Checks {
+    pub(super) fn new(previous: VerdictState, hysteresis: f64) -> Self {
+        Self { made: Vec::new(), previous, hysteresis, probability: None }
+    }
+
+    pub(super) fn add(&mut self, name: &str, outcome: Outcome, text: String) {
+        self.made.push((outcome, VerdictReason { check: name.into(), passed: outcome == Outcome::Passed, text }));
+    }
+
+    /// Whether the measurement can be trusted.
+    pub(super) fn trusted(&mut self, name: &str, ok: bool, text: String) {
+        self.add(name, if ok { Outcome::Passed } else { Outcome::Untrusted }, text);
+    }
+
+    /// Whether something is known.
+    pub(super) fn known(&mut self, name: &str, ok: bool, text: String) {
+        self.add(name, if ok { Outcome::Passed } else { Outcome::Failed }, text);
+    }
+
+    /// A quantity against its limit. The upper bound must be under it, well under it to become safe; the lower bound over it is known to be
+    /// too much, and what was too much stays so until the best estimate is under the limit.
+    pub(super) fn limit(&mut self, name: &str, what: &str, unit: &str, measured: Estimate, limit: f64) {
+        let Estimate { value, low, high } = measured;
+        let margin = if self.previous == VerdictState::Safe { 1.0 } else { 1.0 - self.hysteresis };
+        let (outcome, verb) = if !measured.is_valid() {
+            (Outcome::Failed, "not surely under")
+        } else if low > limit || (self.previous == VerdictState::Unsafe && value >= limit) {
+            (Outcome::Over, "over")
+        } else if high < limit * margin {
+            (Outcome::Passed, "under")
+        } else {
+            (Outcome::Failed, "not surely under")
+        };
+        let target = if margin < 1.0 { format!(" (by {:.0} % to become safe)", self.hysteresis * 100.0) } else { String::new() };
+        let text = format!("{what} {value:.3} {unit} ({low:.3} to {high:.3}), {verb} the limit of {limit:.3} {unit}{target}");
+        self.add(name, outcome, text);
+        let under = probability_under(measured, limit);
+        self.probability = Some(self.probability.map_or(under, |least| least.min(under)));
+    }
+
+    /// A quantity that could not be measured.
+    pub(super) fn unknown(&mut self, name: &str, text: &str) {
+        self.add(name, Outcome::Failed, text.into());
+        self.probability = Some(0.0);
+    }
+
+    /// The verdict, its reasons, what decided before the rest, and the probability that everything is under its limit: quantities all
+    /// follow the height of the waves, and so the least probable one tells.
+    pub(super) fn verdict(mut self) -> (VerdictState, Vec<VerdictReason>, Option<f64>) {
+        let state = match self.made.iter().map(|(outcome, _)| *outcome).min() {
+            None | Some(Outcome::Untrusted | Outcome::Failed) => VerdictState::Inconclusive,
+            Some(Outcome::Over) => VerdictState::Unsafe,
+            Some(Outcome::Passed) => VerdictState::Safe,
+        };
+        let trusted = !self.made.iter().any(|(outcome, _)| *outcome == Outcome::Untrusted);
+        self.made.sort_by_key(|(outcome, _)| *outcome);
+        let reasons = self.made.into_iter().map(|(_, reason)| reason).collect();
+        (state, reasons, self.probability.filter(|_| trusted))
+    }
+}
+
+/// Probability that a positive quantity is under `limit`: its logarithm is taken as normal, each half with the width that its side of the 95 %
+/// interval has. 0 for what is not known.
+fn probability_under(measured: Estimate, limit: f64) -> f64 {
+    const NORMAL_95: f64 = 1.959_964;
+    let Estimate { value, low, high } = measured;
+    if !measured.is_valid() {
+        return 0.0;
+    }
+    // Nothing measured but a bound: half of a normal distribution.
+    if value <= 0.0 {
+        return if high > 0.0 { normal(NORMAL_95 * limit / high) } else { 1.0 };
+    }
+    let width = if limit >= value { (high / value).ln() } else { (value / low).ln() } / NORMAL_95;
+    let distance = (limit / value).ln();
+    match width {
+        w if w > 0.0 => normal(distance / w),
+        _ => f64::from(u8::from(distance > 0.0)),
+    }
+}
+
+/// The normal distribution's cumulative function.
+fn normal(z: f64) -> f64 {
+    halcyon_ocean::confidence::normal_cumulative(z)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn probabilities_are_those_of_the_interval() {
+        let measured = Estimate { value: 0.10, low: 0.08, high: 0.125 };
+        let close = |limit: f64, expected: f64| {
+            let found = probability_under(measured, limit);
+            assert!((found - expected).abs() < 1e-4, "{limit}: {found}");
+        };
+        close(0.125, 0.975);
+        close(0.08, 0.025);
+        close(0.10, 0.5);
+        close(1e3, 1.0);
+        let unknown = Estimate { value: f64::NAN, ..measured };
+        assert_eq!(probability_under(unknown, 1.0), 0.0);
+        let exact = Estimate { value: 0.1, low: 0.1, high: 0.1 };
+        assert_eq!((probability_under(exact, 0.11), probability_under(exact, 0.09)), (1.0, 0.0));
+        let still = Estimate { value: 0.0, low: 0.0, high: 0.01 };
+        assert!((probability_under(still, 0.01) - 0.975).abs() < 1e-4);
+        // A lower bound of nothing leaves everything open below the value.
+        assert!(probability_under(Estimate { value: 0.1, low: 0.0, high: 0.2 }, 0.05) > 0.4);
+    }
+
+    #[test]
+    fn no_check_is_no_safety() {
+        assert_eq!(Checks::new(VerdictState::Safe, 0.1).verdict().0, VerdictState::Inconclusive);
+    }
+}
