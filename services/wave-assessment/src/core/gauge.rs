@@ -7,6 +7,8 @@ use super::smooth::{SMOOTHINGS, Smoother};
 
 /// Gauges along each side of the layout.
 const SIDE: usize = 3;
+/// The outer ones are this share of a side from the edges: a vehicle that holds its place sways.
+const MARGIN: f64 = 0.15;
 /// Gauges at work at once.
 pub(crate) const GAUGES: usize = SIDE * SIDE;
 /// The gauge in the middle of the layout.
@@ -44,7 +46,7 @@ struct Gauge {
     misses: u32,
 }
 
-/// Nine gauges in a square over the middle half of the patch. Each stays over its water while the vehicle moves a little, and
+/// Nine gauges in a square over the patch. Each stays over its water while the vehicle moves a little, and
 /// is placed anew when it leaves the patch or sees nothing.
 #[derive(Debug, Default)]
 pub(crate) struct Gauges {
@@ -79,10 +81,10 @@ impl Gauges {
     }
 }
 
-/// Where a slot's gauge is placed: at the cell nearest to 1/4, 1/2 or 3/4 of the patch, or the nearest to it within an eighth that
+/// Where a slot's gauge is placed: at the cell nearest to its place in the layout, or the nearest to it within an eighth that
 /// has a measurement. Right on a cell, so that grids that keep to multiples of their cell need no interpolation.
 fn nominal(grid: &ElevationGrid, slot: usize) -> LocalPoint {
-    let fraction = |i: usize| (i + 1) as f64 / (SIDE + 1) as f64;
+    let fraction = |i: usize| MARGIN + (1.0 - 2.0 * MARGIN) * i as f64 / (SIDE - 1) as f64;
     let (rows, cols) = (f64::from(grid.rows - 1), f64::from(grid.cols - 1));
     let (row, col) = ((fraction(slot / SIDE) * rows).round(), (fraction(slot % SIDE) * cols).round());
     let (reach_rows, reach_cols) = ((rows / 8.0).floor() as i64, (cols / 8.0).floor() as i64);

@@ -6,7 +6,7 @@ use super::series::Series;
 /// Correlations further apart than this many mean periods are taken as nothing.
 const LAG_PERIODS: f64 = 5.0;
 /// The degrees of freedom come from the same short window as the variance; so much of them is claimed.
-const CLAIMED: f64 = 0.85;
+const CLAIMED: f64 = 0.7;
 /// Lags reach at least this far, seconds.
 const LAG_S_MIN: f64 = 2.0;
 

@@ -26,6 +26,8 @@ use super::window::Window;
 const DENSER: f64 = 4.0;
 /// Heights of single waves scatter a little more than the variance does: their intervals have this share of its freedom.
 const HEIGHT_FREEDOM: f64 = 0.9;
+/// And slopes scatter less: theirs have this many times its freedom.
+const SLOPE_FREEDOM: f64 = 1.8;
 /// Near the ends of the window a filter cannot know how waves go on: single ones of the hidden part are wrong by about this share.
 const SPLIT_ERROR: f64 = 0.05;
 /// Of what could be waves and is not believed to be, so much may have been believed by mistake.
@@ -242,8 +244,8 @@ fn max(values: &[f64]) -> f64 {
     values.iter().copied().fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// Root mean square slope over all frames. It has at least the variance's degrees of freedom: a whole patch is seen, and steep
-/// waves are short.
+/// Root mean square slope over all frames. It has more degrees of freedom than the variance: a whole patch is seen, and steep waves are short
+/// (2.4 times as many over made seas).
 fn slope(window: &Window, freedom: f64) -> Option<Estimate> {
     let slopes: Vec<_> = window.frames().iter().filter_map(|f| f.slope).collect();
     if slopes.is_empty() {
@@ -252,7 +254,7 @@ fn slope(window: &Window, freedom: f64) -> Option<Estimate> {
     let n = slopes.len() as f64;
     let mean_square = slopes.iter().map(|s| s.mean_square).sum::<f64>() / n;
     let noise = slopes.iter().map(|s| s.noise).sum::<f64>() / n;
-    let (low, high) = variance_factors_95(freedom);
+    let (low, high) = variance_factors_95(SLOPE_FREEDOM * freedom);
     let root = |x: f64| x.max(0.0).sqrt();
     Some(Estimate { value: root(mean_square - noise), low: root(mean_square * low - noise), high: root(mean_square * high) })
 }

@@ -127,10 +127,20 @@ fn survey(grid: &ElevationGrid) -> (f64, Option<u64>) {
     (seen as f64 / grid.elevation_m.len() as f64, (seen > 0).then(|| hasher.finish()))
 }
 
-/// Mean square slope between cells about `baseline_m` apart, over all pairs seen; `None` without a pair in both directions.
+/// Mean square slope between points `baseline_m` apart, over all pairs seen: between those of the whole numbers of cells to either side of it.
+/// `None` without a pair in both directions.
 fn slope(grid: &ElevationGrid, baseline_m: f64) -> Option<Slope> {
+    let step_max = grid.rows.min(grid.cols) as usize - 1;
+    let steps = (baseline_m / grid.cell_m).clamp(1.0, step_max as f64);
+    let (lower, upper) = (slope_over(grid, steps.floor() as usize)?, slope_over(grid, steps.ceil() as usize)?);
+    let share = steps.fract();
+    let between = |of: fn(&Slope) -> f64| of(&lower) + share * (of(&upper) - of(&lower));
+    Some(Slope { mean_square: between(|s| s.mean_square), noise: between(|s| s.noise) })
+}
+
+/// The same between cells `step` apart.
+fn slope_over(grid: &ElevationGrid, step: usize) -> Option<Slope> {
     let (rows, cols) = (grid.rows as usize, grid.cols as usize);
-    let step = ((baseline_m / grid.cell_m).round().max(1.0) as usize).min(rows.min(cols) - 1);
     let run_m = step as f64 * grid.cell_m;
     let (mut mean_square, mut noise) = (0.0, 0.0);
     for (row_step, col_step) in [(step, 0), (0, step)] {

@@ -36,12 +36,14 @@ impl Component {
 pub struct Sea(pub Vec<Component>);
 
 impl Sea {
-    /// A Gaussian sea: each of many narrow bands has a wave of random (complex normal) amplitude, in a direction drawn from cos-2s
-    /// spreading with s = 10 about 60°. 4 √m0 of the bands is `h_m0_m` but for the cut tails, which [`Self::h_m0_m`] counts.
+    /// A Gaussian sea: each of many narrow bands has waves of random (complex normal) amplitude and frequency in several directions, drawn from
+    /// cos-2s spreading with s = 10 about 60°. One direction a band would make a sea that looks the same wherever one stands (Jefferys 1987),
+    /// so that a patch would tell no more than a point. 4 √m0 of the bands is `h_m0_m` but for the cut tails, which [`Self::h_m0_m`] counts.
     pub fn jonswap(h_m0_m: f64, t_p_s: f64, seed: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let components = bands(h_m0_m, t_p_s)
-            .map(|(low_hz, width_hz, variance_m2)| {
+        let mut components = Vec::new();
+        for (low_hz, width_hz, variance_m2) in bands(h_m0_m, t_p_s) {
+            for _ in 0..DIRECTIONS {
                 let f_hz = low_hz + width_hz * random.random::<f64>();
                 let offset_rad = loop {
                     let angle_rad = TAU * (random.random::<f64>() - 0.5);
@@ -49,15 +51,15 @@ impl Sea {
                         break angle_rad;
                     }
                 };
-                let sigma_m = variance_m2.sqrt();
+                let sigma_m = (variance_m2 / f64::from(DIRECTIONS)).sqrt();
                 let mut normal = || sigma_m * random.sample::<f64, _>(rand_distr::StandardNormal);
-                Component {
+                components.push(Component {
                     re_m: normal(),
                     im_m: normal(),
                     ..Component::regular(1.0, 1.0 / f_hz, 60.0 + offset_rad.to_degrees())
-                }
-            })
-            .collect();
+                });
+            }
+        }
         Self(components)
     }
 
@@ -77,12 +79,15 @@ impl Sea {
     }
 }
 
-/// (lowest frequency, width, variance) of 240 bands from 0.55 to 2.45 peak frequencies. A sum of n bands repeats itself after n / (1.9
-/// f_p): there must be so many that its variance is free to wander throughout an observation.
+/// Waves in each band.
+const DIRECTIONS: u32 = 20;
+
+/// (lowest frequency, width, variance) of 100 bands from 0.55 to 2.45 peak frequencies. A sum of n waves repeats itself after n / (1.9
+/// f_p) at the soonest: there must be so many that its variance is free to wander throughout an observation.
 fn bands(h_m0_m: f64, t_p_s: f64) -> impl Iterator<Item = (f64, f64, f64)> {
     let spectrum = Jonswap::new(h_m0_m, t_p_s, 3.3).unwrap();
-    let width_hz = 1.9 / t_p_s / 240.0;
-    (0..240).map(move |i| {
+    let width_hz = 1.9 / t_p_s / 100.0;
+    (0..100).map(move |i| {
         let low_hz = 0.55 / t_p_s + f64::from(i) * width_hz;
         (low_hz, width_hz, spectrum.density_m2_per_hz(low_hz + 0.5 * width_hz) * width_hz)
     })
@@ -131,35 +136,35 @@ impl Camera {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed ^ 0xca3e_7a00);
         let (rows, cols) = (self.rows as usize, self.cols as usize);
         // Each wave as a phasor over the cells, turned a little from frame to frame: no trigonometry inside.
-        let waves: Vec<(Vec<(f64, f64)>, f64)> = sea
+        let waves: Vec<(Vec<f32>, Vec<f32>, f64)> = sea
             .0
             .iter()
             .map(|c| {
-                let phasors = (0..rows * cols)
-                    .map(|i| {
-                        let (n, e) =
-                            (self.north_m + (i / cols) as f64 * self.cell_m, self.east_m + (i % cols) as f64 * self.cell_m);
-                        let (sin, cos) = (c.north_radpm * n + c.east_radpm * e).sin_cos();
-                        (c.re_m * cos - c.im_m * sin, c.re_m * sin + c.im_m * cos)
-                    })
-                    .collect();
-                (phasors, c.radps)
+                let phasors = (0..rows * cols).map(|i| {
+                    let (n, e) =
+                        (self.north_m + (i / cols) as f64 * self.cell_m, self.east_m + (i % cols) as f64 * self.cell_m);
+                    let (sin, cos) = (c.north_radpm * n + c.east_radpm * e).sin_cos();
+                    ((c.re_m * cos - c.im_m * sin) as f32, (c.re_m * sin + c.im_m * cos) as f32)
+                });
+                let (re, im) = phasors.unzip();
+                (re, im, c.radps)
             })
             .collect();
-        let mut surface_m = vec![0.0; rows * cols];
+        let mut surface_m = vec![0.0_f32; rows * cols];
         (0..count)
             .map(|frame| {
                 let t_s = frame as f64 / self.rate_hz;
                 surface_m.fill(0.0);
-                for (phasors, radps) in &waves {
+                for (re, im, radps) in &waves {
                     let (sin, cos) = (radps * t_s).sin_cos();
-                    for (z, (re, im)) in surface_m.iter_mut().zip(phasors) {
+                    let (sin, cos) = (sin as f32, cos as f32);
+                    for ((z, re), im) in surface_m.iter_mut().zip(re).zip(im) {
                         *z += re * cos + im * sin;
                     }
                 }
-                let mean_m = surface_m.iter().sum::<f64>() / surface_m.len() as f64;
+                let mean_m = surface_m.iter().map(|z| f64::from(*z)).sum::<f64>() / surface_m.len() as f64;
                 let mut noise = |sigma_m: f64| sigma_m * random.sample::<f64, _>(rand_distr::StandardNormal);
-                let elevation_m = surface_m.iter().map(|z| (z - mean_m + noise(self.sigma_m)) as f32).collect();
+                let elevation_m = surface_m.iter().map(|z| (f64::from(*z) - mean_m + noise(self.sigma_m)) as f32).collect();
                 let level_m = self.level_sigma_m.map(|sigma_m| mean_m + noise(sigma_m));
                 self.patch(frame, elevation_m, level_m, 5.0 - mean_m)
             })
