@@ -257,7 +257,7 @@ fn bad_patches_are_refused_by_name_and_change_nothing() {
         (|p| p.rig = halcyon_model::RigId::new("other").unwrap(), |e| matches!(e, PatchError::OtherRig { .. })),
         (|p| p.stamp = p.stamp.plus_secs_f64(3600.0), |e| matches!(e, PatchError::Future { .. })),
         (|p| p.stamp = p.stamp.plus_secs_f64(-60.0), |e| matches!(e, PatchError::Late { .. })),
-        (|p| p.stamp = p.stamp.plus_secs_f64(-0.3), |e| matches!(e, PatchError::OutOfOrder { .. })),
+        (|p| p.stamp = p.stamp.plus_secs_f64(-0.199), |e| matches!(e, PatchError::Crowded { .. })),
         (|_| {}, |e| matches!(e, PatchError::Duplicate { .. })),
         (|p| p.grid.elevation_m.clear(), |e| matches!(e, PatchError::Shape { .. })),
         (|p| p.grid.rows = 0, |e| matches!(e, PatchError::Shape { .. })),
@@ -284,6 +284,26 @@ fn bad_patches_are_refused_by_name_and_change_nothing() {
         assert!(is_expected(&error), "{error}");
     }
     assert_eq!(found.unwrap(), expected);
+}
+
+/// Patches that overtake each other on the way leave the same window as patches in their order.
+#[test]
+fn late_patches_take_their_place() {
+    let patches = Camera::default().film(&Sea::jonswap(0.05, 1.3, 5), 200);
+    let expected = assess(&mut assessor(|_| {}), &patches).pop().unwrap();
+    let mut overtaken = patches.clone();
+    // The first one stays: gauges are placed by it. The last one stays: it is when the window is assessed.
+    overtaken[1..199].chunks_mut(3).for_each(<[SurfacePatch]>::reverse);
+    let mut assessor = assessor(|_| {});
+    let mut found = None;
+    for patch in &overtaken {
+        found = assessor.observe(patch, patches[199].stamp.min(patch.stamp.plus_secs_f64(0.7))).unwrap().or(found);
+    }
+    let now = patches[199].stamp.plus_secs_f64(0.1);
+    let (found, expected) = (assessor.conclude(now).unwrap(), SeaState { stamp: now, ..expected });
+    assert_eq!(found.trace.len(), 200, "none is lost: {:?}", found.window_s);
+    assert!((found.h_m0_m.unwrap().value / expected.h_m0_m.unwrap().value - 1.0).abs() < 0.02, "{found:?}");
+    assert!(assessor.observe(&patches[100], now).is_err(), "and none counts twice");
 }
 
 #[test]

@@ -8,7 +8,8 @@ use super::series::Series;
 
 /// Findings that are no reason to distrust the rest: gaps break series, and what is left is judged by itself; bad readings are counted by the
 /// check of outliers; how steep the sea is, is what the verdict is about.
-const REPORTED_ONLY: [Test; 4] = [Test::Gap, Test::Spike, Test::PercentGood, Test::Stamps];
+const REPORTED_ONLY: [Test; 6] =
+    [Test::Gap, Test::Spike, Test::PercentGood, Test::Stamps, Test::Steepness, Test::BulkRange];
 
 /// What did not pass at the central gauge, or at the one that saw the most where that one saw less than half of it. Where nothing stands out
 /// of the noise (`above_noise`), tests of waves have nothing to test.
