@@ -4,7 +4,8 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::ForecastError;
 use super::line::Prior;
-use super::reading::{Reading, thin};
+use super::outlook::Spot;
+use super::reading::{Reading, chosen};
 
 /// What is known of the level from which readings of one group are measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -35,7 +36,7 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { level: Level::Known, span_s: 30.0, readings_max: 320, per_frame_max: 16, dense_s: 4.0 }
+        Self { level: Level::Known, span_s: 16.0, readings_max: 320, per_frame_max: 16, dense_s: 1.0 }
     }
 }
 
@@ -45,6 +46,9 @@ pub struct Forecast {
     pub(super) prior: Prior,
     /// Origin of phases: a reading's place, and now.
     pub(super) origin: (f64, f64, f64),
+    pub(super) oldest_s: f64,
+    /// South-west and north-east of all readings.
+    corners: [(f64, f64); 2],
     /// Readings by twice the lines: cos and sin of each line at each reading, times the root of its variance.
     pub(super) features: DMatrix<f64>,
     pub(super) factor: Cholesky<f64, Dyn>,
@@ -66,12 +70,12 @@ impl Forecast {
         if !now_s.is_finite() {
             return Err(ForecastError::Now);
         }
-        let usable: Vec<Reading> = readings.iter().filter(|r| r.is_usable(now_s, options.span_s)).copied().collect();
-        let dropped = readings.len() - usable.len();
-        let dense_s = if options.dense_s > 0.0 { options.dense_s } else { 1e-3 };
-        let used = thin(usable, now_s, options.readings_max.max(1), options.per_frame_max, dense_s);
+        let used = chosen(readings, now_s, options);
         let Some(first) = used.first() else { return Err(ForecastError::NoReadings { given: readings.len() }) };
         let origin = (first.north_m, first.east_m, now_s);
+        let dropped = readings.iter().filter(|r| !r.is_usable(now_s, options.span_s)).count();
+        let oldest_s = used.iter().map(|r| r.t_s).fold(now_s, f64::min);
+        let corners = corners(&used);
         let features = features(&used, prior, origin);
         let mut covariance = symmetric_square(&features);
         let mut elevations_m = DVector::from_iterator(used.len(), used.iter().map(|r| r.elevation_m));
@@ -96,7 +100,17 @@ impl Forecast {
         let log_determinant: f64 = 2.0 * factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum::<f64>();
         let log_evidence = -0.5 * (log_determinant + degrees as f64 * log_scale);
         let prior = prior.clone();
-        Ok(Self { prior, origin, features, factor, amplitudes, inflation, used: used.len(), dropped, log_evidence })
+        let used = used.len();
+        Ok(Self { prior, origin, oldest_s, corners, features, factor, amplitudes, inflation, used, dropped, log_evidence })
+    }
+
+    /// Whether the lines are good from all readings to `spot` and `t_s`.
+    pub(super) fn reaches(&self, spot: Spot, t_s: f64) -> bool {
+        let away = |at: f64, low: f64, high: f64| (at - low).max(high - at);
+        let [low, high] = self.corners;
+        let away_m = away(spot.north_m, low.0, high.0).hypot(away(spot.east_m, low.1, high.1));
+        // Written so that NaN reaches nowhere.
+        away_m.is_finite() && away_m <= self.prior.extent_m && t_s.is_finite() && t_s - self.oldest_s <= self.prior.span_s
     }
 
     /// Readings the forecast rests on.
@@ -123,6 +137,13 @@ impl Forecast {
     pub fn log_evidence(&self) -> f64 {
         self.log_evidence
     }
+}
+
+/// The corners of the box that holds all readings, north and east, lowest first.
+fn corners(readings: &[Reading]) -> [(f64, f64); 2] {
+    readings.iter().fold([(f64::INFINITY, f64::INFINITY), (f64::NEG_INFINITY, f64::NEG_INFINITY)], |[low, high], r| {
+        [(low.0.min(r.north_m), low.1.min(r.east_m)), (high.0.max(r.north_m), high.1.max(r.east_m))]
+    })
 }
 
 /// Cosine and sine of each line at each reading, times the root of its variance.

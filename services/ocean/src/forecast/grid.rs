@@ -36,7 +36,9 @@ const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 impl Grid {
     /// Lines at most, where nothing else is asked for.
-    pub const LINES_MAX: usize = 400;
+    pub const LINES_MAX: usize = 500;
+    /// Cells in frequency for each 1/`span_s`.
+    const FINENESS: f64 = 2.0;
     /// Cells in frequency at most: for a longer span they are wider.
     pub const FREQUENCIES_MAX: usize = 256;
     /// Directions of one frequency at most.
@@ -60,7 +62,7 @@ impl Grid {
         if !(band && span_s > 0.0 && extent_m >= 0.0) {
             return Err(ForecastError::Grid);
         }
-        let cells = ((high_hz - low_hz) * span_s * 1.25).ceil().clamp(1.0, Self::FREQUENCIES_MAX as f64);
+        let cells = ((high_hz - low_hz) * span_s * Self::FINENESS).ceil().clamp(1.0, Self::FREQUENCIES_MAX as f64);
         let df_hz = (high_hz - low_hz) / cells;
         let mut lines = Vec::new();
         for cell in 0..cells as u32 {
@@ -83,7 +85,7 @@ impl Grid {
                 }
             }
         }
-        Ok(Prior::new(lines)?.with_at_most(self.lines_max))
+        Ok(Prior { span_s, extent_m, ..Prior::new(lines)? }.with_at_most(self.lines_max))
     }
 
     /// Lines of a frequency spectrum, m²/Hz, spread about `towards_rad`, the direction waves travel towards, radians clockwise from

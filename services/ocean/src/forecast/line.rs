@@ -49,13 +49,18 @@ impl Variances {
 /// reading and to the variance of each forecast.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prior {
-    lines: Vec<Line>,
-    rest: Variances,
-    sea: Variances,
+    pub(super) lines: Vec<Line>,
+    pub(super) rest: Variances,
+    pub(super) sea: Variances,
+    /// From the oldest reading to the last forecast that the lines are good for, seconds.
+    pub(super) span_s: f64,
+    /// Across readings and spots that the lines are good for, metres.
+    pub(super) extent_m: f64,
 }
 
 impl Prior {
-    /// Checks and takes `lines`; with none left out. Lines of variance 0 are dropped.
+    /// Checks and takes `lines`; with none left out. Lines of variance 0 are dropped. Each is taken to be a wave, which will go on for ever: lines
+    /// that stand for bands of a spectrum come from a [`Grid`](super::Grid), which knows how far they are good.
     ///
     /// # Errors
     /// [`ForecastError::Line`] where a number is not finite or a variance is negative; [`ForecastError::NoLines`] where nothing is left.
@@ -74,7 +79,10 @@ impl Prior {
                 kept.push(line);
             }
         }
-        if kept.is_empty() { Err(ForecastError::NoLines) } else { Ok(Self { lines: kept, rest: Variances::default(), sea }) }
+        if kept.is_empty() {
+            return Err(ForecastError::NoLines);
+        }
+        Ok(Self { lines: kept, rest: Variances::default(), sea, span_s: f64::INFINITY, extent_m: f64::INFINITY })
     }
 
     /// Keeps the `lines_max` lines of the highest variance (at least one) and counts the others among the waves left out.
@@ -86,6 +94,17 @@ impl Prior {
             self.lines.drain(lines_max..).for_each(|line| self.rest.add(&line));
         }
         self
+    }
+
+    /// The same waves left out, and the same bounds, with other lines.
+    pub(super) fn with_lines(&self, lines: impl IntoIterator<Item = Line>) -> Result<Self, ForecastError> {
+        let mut other = Self { rest: self.rest, span_s: self.span_s, extent_m: self.extent_m, ..Self::new(lines)? };
+        let rest = self.rest;
+        other.sea.elevation_m2 += rest.elevation_m2;
+        other.sea.slope_north += rest.slope_north;
+        other.sea.slope_east += rest.slope_east;
+        other.sea.vertical_speed_m2ps2 += rest.vertical_speed_m2ps2;
+        Ok(other)
     }
 
     /// The lines.

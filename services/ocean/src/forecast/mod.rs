@@ -13,6 +13,7 @@
 //! | [`grid`] | lines for a spectrum and a spread |
 //! | [`reading`] | a reading; which are used where there are too many |
 //! | [`fit`] | the regression |
+//! | [`tune`] | a spectrum set right by the readings |
 //! | [`outlook`] | elevation, slopes and vertical speed at a time, with their errors |
 
 pub mod fit;
@@ -20,12 +21,14 @@ pub mod grid;
 pub mod line;
 pub mod outlook;
 pub mod reading;
+pub mod tune;
 
 pub use fit::{Forecast, Level, Options};
 pub use grid::Grid;
 pub use line::{Line, Prior, Variances};
 pub use outlook::{Outlook, Spot};
 pub use reading::Reading;
+pub use tune::{Search, Tuned};
 
 /// Why there is no forecast.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]

@@ -51,7 +51,8 @@ pub struct Ignorance {
 }
 
 impl Forecast {
-    /// The sea at `spot` and `t_s`. Nothing is known (means of 0, the sea's own errors) of a place or time that is not finite.
+    /// The sea at `spot` and `t_s`. Nothing is known (means of 0, the sea's own errors) of a place or time that is not finite, or farther from the
+    /// readings than the prior's lines are good for.
     #[must_use]
     pub fn at(&self, spot: Spot, t_s: f64) -> Outlook {
         let unknown = || outlook(t_s, [0.0; 4], self.prior.sea().as_array(), &self.prior.sea(), self.inflation);
@@ -86,8 +87,7 @@ impl Forecast {
         let rest = self.prior.rest().as_array();
         let all = sea.as_array();
         let one = |(place, &t_s): (usize, &f64)| {
-            let finite = solved && t_s.is_finite() && north_m.is_finite() && east_m.is_finite();
-            if !finite {
+            if !solved || !self.reaches(spot, t_s) {
                 return outlook(t_s, [0.0; 4], all, &sea, self.inflation);
             }
             let mean = [0, 1, 2, 3].map(|q| means[4 * place + q]);

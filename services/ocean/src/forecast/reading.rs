@@ -1,5 +1,7 @@
 //! Readings of elevation, and which of them are used where there are too many.
 
+use super::fit::Options;
+
 /// One reading of elevation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reading {
@@ -26,15 +28,16 @@ impl Reading {
     }
 }
 
+/// Those of `readings` that are usable, thinned to the bounds of `options`.
+pub(super) fn chosen(readings: &[Reading], now_s: f64, options: &Options) -> Vec<Reading> {
+    let usable = readings.iter().filter(|r| r.is_usable(now_s, options.span_s)).copied().collect();
+    let dense_s = if options.dense_s > 0.0 { options.dense_s } else { 1e-3 };
+    thin(usable, now_s, options.readings_max.max(1), options.per_frame_max, dense_s)
+}
+
 /// At most `readings_max` of `readings`, which are usable ones: `per_frame` well apart of each frame (a group at one time), and frames that
 /// lie the closer the younger they are, since what has been seen long ago has mostly left the place. Frame spacing grows with age a as a + `dense_s`.
-pub(super) fn thin(
-    mut readings: Vec<Reading>,
-    now_s: f64,
-    readings_max: usize,
-    per_frame: usize,
-    dense_s: f64,
-) -> Vec<Reading> {
+fn thin(mut readings: Vec<Reading>, now_s: f64, readings_max: usize, per_frame: usize, dense_s: f64) -> Vec<Reading> {
     if readings.len() <= readings_max {
         return readings;
     }

@@ -143,7 +143,7 @@ fn bad_inputs_are_errors_or_unknown() {
         Reading { sigma_m: 0.0, ..fine },
         Reading { sigma_m: f64::NAN, ..fine },
         Reading { t_s: 0.1, ..fine },
-        Reading { t_s: -31.0, ..fine },
+        Reading { t_s: -16.1, ..fine },
         Reading { north_m: f64::INFINITY, ..fine },
     ];
     assert_eq!(fit(&bad, 0.0).unwrap_err(), ForecastError::NoReadings { given: 6 });
