@@ -5,7 +5,7 @@
 use std::f64::consts::{PI, TAU};
 
 use halcyon_ocean::forecast::grid::interpolated;
-use halcyon_ocean::forecast::{Forecast, Grid, Level, Options, Prior, Reading, Search, Spot};
+use halcyon_ocean::forecast::{Forecast, Grid, Level, Limits, Options, Prior, Reading, Search, Spot};
 use halcyon_ocean::{CosTwoS, GRAVITY_MPS2, Jonswap, Record, SampledSpectrum, Spectrum, Welch};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -204,5 +204,73 @@ fn explore() {
             let hit = [0, 1, 2, 3].map(|q| format!("{:.2}", inside[q][i]));
             println!("  {lead} s: stated {:.3} skill {} inside {}", 1.0 - ign[i], skill.join(" "), hit.join(" "));
         }
+    }
+}
+
+#[test]
+#[ignore = "figures"]
+fn explore_calm() {
+    let seas = env("SEAS", 60.0) as u64;
+    for (h_s, t_p, gamma, s, sigma) in [(0.2, 1.5, 3.3, 10.0, 0.003), (0.3, 2.0, 1.0, 5.0, 0.005), (0.5, 4.0, 3.3, 10.0, 0.005)]
+    {
+        let spectrum = Jonswap::new(h_s, t_p, gamma).unwrap();
+        let (mut offered, mut broken, mut with, mut random_broken, mut start, mut length, mut cut) = (0, 0, 0, 0, 0.0, 0.0, 0);
+        let mut lead = [0; 6];
+        for seed in 0..seas {
+            let mut random = ChaCha8Rng::seed_from_u64(1000 + seed);
+            let towards = random.random::<f64>() * TAU;
+            let sea = sea(&spectrum, s, towards, 300, &mut random);
+            let readings = readings(&sea, 1.0, 20.0, sigma, &mut random);
+            let options = Options { readings_max: env("N", 320.0) as usize, ..Options::default() };
+            let grid = Grid::about_peak(1.0 / t_p, 26.0, 5.6);
+            let believed = Jonswap::new(h_s, t_p * env("TP", 1.0), gamma).unwrap();
+            let turn = towards + env("TURN", 0.0).to_radians();
+            let density = |f: f64, th: f64| believed.density_m2_per_hz(f) * CosTwoS::new(s).unwrap().density_per_rad(th - turn);
+            let prior = if env("MODE", 0.0) > 0.0 {
+                grid.tuned(density, &readings, 0.0, &options, &Search::near()).unwrap().prior
+            } else {
+                grid.directional(density).unwrap()
+            };
+            let forecast = Forecast::fit(&readings, &prior, 0.0, &options).unwrap();
+            let own = prior.sea();
+            let k = env("LIMIT", 1.3);
+            let limits = Limits {
+                crest_m: k * own.elevation_m2.sqrt(),
+                slope: if env("SLOPE", 1.0) > 0.0 {
+                    k * 1.4 * (own.slope_north + own.slope_east).sqrt()
+                } else {
+                    f64::INFINITY
+                },
+                vertical_speed_mps: k * own.vertical_speed_m2ps2.sqrt(),
+            };
+            let breaks = |from: f64, to: f64| {
+                (0..=((to - from) / 0.02) as u32).any(|i| {
+                    let [z, a, b, w] = truth(&sea, 0.2, -0.3, from + 0.02 * f64::from(i));
+                    z > limits.crest_m || a.hypot(b) > limits.slope || w.abs() > limits.vertical_speed_mps
+                })
+            };
+            let least = env("LEAST", 0.8);
+            let windows = forecast.calm_windows(Spot { north_m: 0.2, east_m: -0.3 }, &limits, 0.0, 10.0, least);
+            with += u32::from(!windows.is_empty());
+            for w in windows {
+                offered += 1;
+                start += w.from_s;
+                length += w.to_s - w.from_s;
+                lead[(w.from_s as usize).min(5)] += 1;
+                broken += u32::from(breaks(w.from_s, w.to_s));
+                cut += u32::from(breaks(w.to_s - least, w.to_s));
+                let from = 10.0 * random.random::<f64>();
+                random_broken += u32::from(breaks(from, from + w.to_s - w.from_s));
+            }
+        }
+        let n = f64::from(offered);
+        println!(
+            "T {t_p}: seas with {with}/{seas} offered {offered} broken {:.3} last part {:.3} random {:.3} mean start {:.2} length {:.2} by second {lead:?}",
+            f64::from(broken) / n,
+            f64::from(cut) / n,
+            f64::from(random_broken) / n,
+            start / n,
+            length / n
+        );
     }
 }

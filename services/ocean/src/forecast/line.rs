@@ -25,6 +25,8 @@ pub struct Variances {
     pub slope_north: f64,
     /// Of the slope eastwards.
     pub slope_east: f64,
+    /// Covariance of both slopes.
+    pub slope_covariance: f64,
     /// Of vertical speed, m²/s².
     pub vertical_speed_m2ps2: f64,
 }
@@ -34,6 +36,7 @@ impl Variances {
         self.elevation_m2 += line.variance_m2;
         self.slope_north += line.variance_m2 * line.k_north_radpm.powi(2);
         self.slope_east += line.variance_m2 * line.k_east_radpm.powi(2);
+        self.slope_covariance += line.variance_m2 * line.k_north_radpm * line.k_east_radpm;
         self.vertical_speed_m2ps2 += line.variance_m2 * line.omega_radps.powi(2);
     }
 
@@ -103,6 +106,7 @@ impl Prior {
         other.sea.elevation_m2 += rest.elevation_m2;
         other.sea.slope_north += rest.slope_north;
         other.sea.slope_east += rest.slope_east;
+        other.sea.slope_covariance += rest.slope_covariance;
         other.sea.vertical_speed_m2ps2 += rest.vertical_speed_m2ps2;
         Ok(other)
     }

@@ -15,7 +15,9 @@
 //! | [`fit`] | the regression |
 //! | [`tune`] | a spectrum set right by the readings |
 //! | [`outlook`] | elevation, slopes and vertical speed at a time, with their errors |
+//! | [`calm`] | stretches within limits |
 
+pub mod calm;
 pub mod fit;
 pub mod grid;
 pub mod line;
@@ -23,6 +25,7 @@ pub mod outlook;
 pub mod reading;
 pub mod tune;
 
+pub use calm::{Bounds, Limits, Window};
 pub use fit::{Forecast, Level, Options};
 pub use grid::Grid;
 pub use line::{Line, Prior, Variances};

@@ -31,6 +31,8 @@ pub struct Outlook {
     pub slope_east: f64,
     /// Its standard error.
     pub slope_east_sigma: f64,
+    /// Covariance of both slopes' errors: of waves from the north-east both err together.
+    pub slope_covariance: f64,
     /// Speed of the surface at the spot, metres per second, positive up.
     pub vertical_speed_mps: f64,
     /// Its standard error, metres per second.
@@ -55,8 +57,7 @@ impl Forecast {
     /// readings than the prior's lines are good for.
     #[must_use]
     pub fn at(&self, spot: Spot, t_s: f64) -> Outlook {
-        let unknown = || outlook(t_s, [0.0; 4], self.prior.sea().as_array(), &self.prior.sea(), self.inflation);
-        self.at_times(spot, &[t_s]).pop().unwrap_or_else(unknown)
+        self.at_times(spot, &[t_s]).pop().unwrap_or_else(|| self.unknown(t_s))
     }
 
     /// The sea at `spot` and each of `times_s`: faster than one by one.
@@ -88,18 +89,25 @@ impl Forecast {
         let all = sea.as_array();
         let one = |(place, &t_s): (usize, &f64)| {
             if !solved || !self.reaches(spot, t_s) {
-                return outlook(t_s, [0.0; 4], all, &sea, self.inflation);
+                return self.unknown(t_s);
             }
             let mean = [0, 1, 2, 3].map(|q| means[4 * place + q]);
             // The prior's variance less what the readings tell; rounding must not take more than there is.
             let left = [0, 1, 2, 3].map(|q| (all[q] - rest[q] - told.column(4 * place + q).norm_squared()).max(0.0) + rest[q]);
-            outlook(t_s, mean, left, &sea, self.inflation)
+            let both = told.column(4 * place + 1).dot(&told.column(4 * place + 2));
+            outlook(t_s, mean, left, sea.slope_covariance - both, &sea, self.inflation)
         };
         times_s.iter().enumerate().map(one).collect()
     }
+
+    /// The sea's own spread and no more.
+    fn unknown(&self, t_s: f64) -> Outlook {
+        let sea = self.prior.sea();
+        outlook(t_s, [0.0; 4], sea.as_array(), sea.slope_covariance, &sea, self.inflation)
+    }
 }
 
-fn outlook(t_s: f64, mean: [f64; 4], left: [f64; 4], sea: &Variances, inflation: f64) -> Outlook {
+fn outlook(t_s: f64, mean: [f64; 4], left: [f64; 4], slope_covariance: f64, sea: &Variances, inflation: f64) -> Outlook {
     let sigma = left.map(|variance| (variance * inflation).sqrt());
     let all = sea.as_array();
     // A slope across long-crested waves has no variance at all: there is nothing not to know.
@@ -112,6 +120,7 @@ fn outlook(t_s: f64, mean: [f64; 4], left: [f64; 4], sea: &Variances, inflation:
         slope_north_sigma: sigma[1],
         slope_east: mean[2],
         slope_east_sigma: sigma[2],
+        slope_covariance: slope_covariance * inflation,
         vertical_speed_mps: mean[3],
         vertical_speed_sigma_mps: sigma[3],
         ignorance: Ignorance { elevation: share(0), slope: share(1).max(share(2)), vertical_speed: share(3) },
