@@ -55,7 +55,8 @@ impl Forecast {
     /// Calm is where the chance that the sea breaks any of the limits anywhere in the stretch is at most 5 %, and all that is limited is known (see
     /// [`Self::IGNORANCE_MAX`]); so the 95 % bounds of each quantity lie within its limit at every moment. The chance is that at the stretch's
     /// beginning plus that of each excursion beginning later: a normal variable that is over a level for a share p of its time goes there
-    /// p/τ times a second, where τ, the time it stays, is 1/6 to 1/5 of its mean period for levels about two standard errors off (Rice 1944).
+    /// p/τ times a second, where τ, the time it stays, is 1/6 of its mean period for levels about two standard errors off (Rice 1944); and what is left
+    /// to err are waves half as long as the sea's mean and less, so τ is 1/14 of the sea's.
     /// A stretch ends where its chance is spent; the next begins there.
     ///
     /// None for times that are not finite or a `least_s` of 0 or less. Bounds far ahead of the readings are the sea's own and never offered.
@@ -72,7 +73,7 @@ impl Forecast {
         // NaN where it is in doubt, which no sum of chances gets over.
         let chances: Vec<f64> =
             outlooks.iter().map(|o| if limits.known(o) { chance::broken(limits, o) } else { f64::NAN }).collect();
-        let begun_per_step = 6.0 * Self::STEP_S / self.mean_period_s();
+        let begun_per_step = 14.0 * Self::STEP_S / self.mean_period_s();
         let mut windows = Vec::new();
         let mut first = 0;
         while first < count {
