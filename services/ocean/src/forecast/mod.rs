@@ -7,6 +7,8 @@
 //! speed of their groups, so those that come later than (edge − spot)/c_g have not been seen (Wu 2004, *Phase-resolved wave forecasts*,
 //! MIT; Naaijen et al. 2014), but for what a narrow band tells.
 //!
+//! Bounded work: a fit is of 320 readings and 500 lines at most by default, whatever is given (see [`Options`] and [`Grid`]).
+//!
 //! | module | holds |
 //! |---|---|
 //! | [`line`] | a plane wave and its prior variance; what the waves left out add |

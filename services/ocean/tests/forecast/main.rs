@@ -7,7 +7,10 @@
 mod score;
 mod seas;
 
-use halcyon_ocean::forecast::{Level, Options};
+use std::hint::black_box;
+use std::time::Instant;
+
+use halcyon_ocean::forecast::{Forecast, Level, Limits, Options};
 use score::{Belief, Calm, LEADS_S, Score};
 use seas::Case;
 
@@ -63,6 +66,44 @@ fn offered_windows_are_calm() {
     println!("{calm:?}");
     assert!(calm.offered >= 20.0 && calm.broken <= 0.1 * calm.offered);
     assert!(calm.random_broken > 2.0 * calm.broken);
+}
+
+/// The time of a fit with ten seconds of forecasts, and of a search for calm windows, with default bounds.
+#[test]
+#[ignore = "times hang on the machine"]
+fn times() {
+    let options = Options::default();
+    for case in [SHORT, LONG] {
+        let mut sea = seas::Sea::new(case, 1);
+        let readings = sea.readings(score::SPAN_S);
+        let prior = score::prior(&case, Belief::Right, &mut sea, &readings, &options);
+        let ten_seconds: Vec<f64> = (0..=50).map(|i| 0.2 * f64::from(i)).collect();
+        let limits = Limits { crest_m: 0.1, slope: 0.2, vertical_speed_mps: 0.3 };
+        let mut took: Vec<[f64; 4]> = Vec::new();
+        for _ in 0..30 {
+            let begin = Instant::now();
+            let forecast = Forecast::fit(&readings, &prior, 0.0, &options).unwrap();
+            let fit = begin.elapsed();
+            black_box(forecast.at_times(score::SPOT, &ten_seconds));
+            let both = begin.elapsed();
+            black_box(forecast.calm_windows(score::SPOT, &limits, 0.0, 10.0, 1.0));
+            let windows = begin.elapsed() - both;
+            let begin = Instant::now();
+            black_box(score::prior(&case, Belief::Tuned(1.0, 0.0), &mut sea, &readings, &options));
+            took.push([fit, both, windows, begin.elapsed()].map(|t| t.as_secs_f64() * 1e3));
+        }
+        for (i, what) in ["fit", "fit and 10 s of forecast", "calm windows of 10 s", "prior tuned"].iter().enumerate() {
+            let mut ms: Vec<f64> = took.iter().map(|t| t[i]).collect();
+            ms.sort_by(f64::total_cmp);
+            println!(
+                "T_p {} s, {} readings, {what}: least {:.1} ms, median {:.1} ms",
+                case.t_p_s,
+                readings.len(),
+                ms[0],
+                ms[15]
+            );
+        }
+    }
 }
 
 #[test]
