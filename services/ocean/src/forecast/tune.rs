@@ -81,7 +81,7 @@ impl Grid {
         let best = tried.iter().map(|t| t.2).fold(f64::NEG_INFINITY, f64::max);
         tried.iter_mut().for_each(|t| t.2 = (t.2 - best).exp());
         let sum: f64 = tried.iter().map(|t| t.2).sum();
-        if !(sum >= 1.0) {
+        if sum.is_nan() || sum < 1.0 {
             return Err(ForecastError::NoLines);
         }
         tried.iter_mut().for_each(|t| t.2 /= sum);

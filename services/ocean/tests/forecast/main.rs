@@ -119,7 +119,7 @@ fn figures() {
             let (prior, fit, out) = (ms(score.prior_took), ms(score.fit_took), ms(score.outlooks_took));
             println!("{case:?}: {prior:.0} + {fit:.0} + {out:.0} ms, rmse 3 s {:.3} H_s", score.rmse_m(3) / case.h_s_m);
             println!("  coverage 0-8 s {:.3}, 1-5 s {:.3}", score.coverage(&[0, 1, 2, 3, 4, 5]), score.coverage(&NEAR));
-            for lead in 1..5 {
+            for lead in NEAR {
                 let [elevation, slope, speed] = score.skills(lead);
                 let (stated, inside) = (score.stated(lead), score.coverage(&[lead]));
                 println!(
