@@ -67,7 +67,7 @@ impl Forecast {
         if !(steps >= 1.0 && least_s > 0.0 && from_s.is_finite()) {
             return Vec::new();
         }
-        let count = (steps as usize + 1).min(Self::TIMES_MAX);
+        let count = (steps.min(Self::TIMES_MAX as f64) as usize + 1).min(Self::TIMES_MAX);
         let times_s: Vec<f64> = (0..count).map(|i| from_s + i as f64 * Self::STEP_S).collect();
         let outlooks = self.at_times(spot, &times_s);
         // NaN where it is in doubt, which no sum of chances gets over.

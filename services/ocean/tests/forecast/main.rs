@@ -106,12 +106,24 @@ fn times() {
     }
 }
 
+fn environment(name: &str, default: u64) -> u64 {
+    std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default)
+}
+
+/// `SEAS` seas of each case; of the beliefs `BELIEFS` from number `FIRST`.
 #[test]
 #[ignore = "figures of the report: minutes"]
 fn figures() {
-    let seas = std::env::var("SEAS").ok().and_then(|v| v.parse().ok()).unwrap_or(150);
-    let beliefs = [Belief::Right, Belief::Tuned(1.2, 30.0), Belief::Tuned(0.8, -30.0), Belief::Welch];
-    for belief in beliefs.into_iter().chain([Belief::Wrong(1.2, 30.0), Belief::WelchAllRound]) {
+    let seas = environment("SEAS", 150);
+    let beliefs = [
+        Belief::Right,
+        Belief::Tuned(1.2, 30.0),
+        Belief::Tuned(0.8, -30.0),
+        Belief::Welch,
+        Belief::Wrong(1.2, 30.0),
+        Belief::WelchAllRound,
+    ];
+    for belief in beliefs.into_iter().skip(environment("FIRST", 0) as usize).take(environment("BELIEFS", 6) as usize) {
         println!("\n{belief:?}");
         for case in CASES {
             let score = Score::of(case, belief, &Options::default(), 0..seas);
@@ -134,8 +146,9 @@ fn figures() {
 #[test]
 #[ignore = "figures of the report: minutes"]
 fn calm_figures() {
-    let seas = std::env::var("SEAS").ok().and_then(|v| v.parse().ok()).unwrap_or(150);
-    for belief in [Belief::Right, Belief::Tuned(1.2, 30.0), Belief::Welch] {
+    let seas = environment("SEAS", 150);
+    let beliefs = [Belief::Right, Belief::Tuned(1.2, 30.0), Belief::Welch];
+    for belief in beliefs.into_iter().skip(environment("FIRST", 0) as usize).take(environment("BELIEFS", 3) as usize) {
         let mut all = Calm::default();
         for case in CASES {
             for tightness in [1.5, 2.0] {

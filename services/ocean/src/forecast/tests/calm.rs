@@ -48,6 +48,8 @@ fn windows_of_a_known_wave_are_its_closed_form() {
     {
         assert_eq!(forecast.calm_windows(SPOT, &limits, from_s, to_s, least_s), []);
     }
+    // For ever is as long as is looked at.
+    assert_eq!(forecast.calm_windows(SPOT, &limits, 0.0, f64::INFINITY, 1.0).len(), 4);
     let broken = Limits { crest_m: f64::NAN, ..limits };
     assert_eq!(forecast.calm_windows(SPOT, &broken, 0.0, 10.0, 1.0), []);
 }

@@ -5,6 +5,7 @@ use crate::dispersion::{Depth, GRAVITY_MPS2};
 use crate::{CosTwoS, Jonswap, Spectrum};
 use approx::assert_relative_eq;
 use nalgebra::{DMatrix, DVector};
+use proptest::prelude::*;
 
 mod calm;
 mod priors;
@@ -183,5 +184,40 @@ fn thinning_keeps_the_bounds_and_the_span() {
         assert_eq!(frame.len(), 16);
         let gaps = frame.iter().flat_map(|a| frame.iter().map(move |b| (a.north_m - b.north_m).hypot(a.east_m - b.east_m)));
         assert!(gaps.filter(|g| *g > 0.0).fold(f64::INFINITY, f64::min) >= 0.5);
+    }
+}
+
+fn any_number() -> impl Strategy<Value = f64> {
+    prop_oneof![4 => -20.0..20.0f64, 1 => Just(f64::NAN), 1 => Just(f64::INFINITY), 1 => Just(-1e300), 1 => Just(0.0), 1 => Just(1e-300)]
+}
+
+proptest! {
+    /// Whatever comes in, there is an error or an outlook whose errors are numbers: no panic, and nothing calm by accident.
+    #[test]
+    fn nothing_that_comes_in_panics(
+        raw in prop::collection::vec((any_number(), any_number(), any_number(), any_number(), any_number(), 0..5u32), 0..40),
+        spot in (any_number(), any_number()),
+        times in (any_number(), any_number(), any_number()),
+        bound in 0..30usize,
+        level in 0..3usize,
+    ) {
+        let readings: Vec<Reading> = raw
+            .into_iter()
+            .map(|(north_m, east_m, t_s, elevation_m, sigma_m, group)| Reading { north_m, east_m, t_s, elevation_m, sigma_m, group })
+            .collect();
+        let prior = Prior::new((0..5).map(|i| line(0.3 + 0.1 * f64::from(i), f64::from(i), 0.01))).unwrap();
+        let level = [Level::Known, Level::Free, Level::FreeWithTilt][level];
+        let options = Options { level, readings_max: bound, per_frame_max: bound / 3, dense_s: times.2, ..Options::default() };
+        if let Ok(forecast) = Forecast::fit(&readings, &prior, times.0, &options) {
+            prop_assert!(forecast.used() <= bound.max(1));
+            let spot = Spot { north_m: spot.0, east_m: spot.1 };
+            let outlook = forecast.at(spot, times.1);
+            prop_assert!(outlook.elevation_sigma_m.is_finite() && outlook.elevation_m.is_finite(), "{outlook:?}");
+            prop_assert!(forecast.at_times(spot, &[]).is_empty());
+            let limits = Limits { crest_m: times.1, slope: times.2, vertical_speed_mps: times.1 };
+            for window in forecast.calm_windows(spot, &limits, times.0, times.1, times.2) {
+                prop_assert!(window.worst.crest_m <= limits.crest_m && window.worst.vertical_speed_mps <= limits.vertical_speed_mps);
+            }
+        }
     }
 }
