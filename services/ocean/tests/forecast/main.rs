@@ -110,7 +110,7 @@ fn environment(name: &str, default: u64) -> u64 {
     std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default)
 }
 
-/// `SEAS` seas of each case; of the beliefs `BELIEFS` from number `FIRST`.
+/// `SEAS` seas of each case, fits of `READINGS`; of the beliefs `BELIEFS` from number `FIRST`.
 #[test]
 #[ignore = "figures of the report: minutes"]
 fn figures() {
@@ -126,7 +126,8 @@ fn figures() {
     for belief in beliefs.into_iter().skip(environment("FIRST", 0) as usize).take(environment("BELIEFS", 6) as usize) {
         println!("\n{belief:?}");
         for case in CASES {
-            let score = Score::of(case, belief, &Options::default(), 0..seas);
+            let options = Options { readings_max: environment("READINGS", 320) as usize, ..Options::default() };
+            let score = Score::of(case, belief, &options, 0..seas);
             let ms = |took: std::time::Duration| took.as_secs_f64() * 1e3 / score.seas;
             let (prior, fit, out) = (ms(score.prior_took), ms(score.fit_took), ms(score.outlooks_took));
             println!("{case:?}: {prior:.0} + {fit:.0} + {out:.0} ms, rmse 3 s {:.3} H_s", score.rmse_m(3) / case.h_s_m);
