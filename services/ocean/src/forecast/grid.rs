@@ -9,7 +9,7 @@ use crate::{CosTwoS, SampledSpectrum};
 /// How a directional spectrum is cut into lines.
 ///
 /// A sum of lines has the spectrum's covariance as long as it is not asked too far away: lines `df` apart repeat themselves after
-/// 1/`df`, and n directions tell no more than n/k metres apart. So cells are 1/(2 `span_s`) high (at 1/(1.25 `span_s`) only 90 % of errors
+/// 1/`df`, and n directions tell no more than n/k metres apart. So cells are 1/(2 `span_s`) high (at 1/(1.25 `span_s`) down to 91 % of errors
 /// were within their 95 %), and each has k·`extent_m` + 6 directions, up to [`Self::DIRECTIONS_MAX`]. Directions turn by the golden ratio
 /// from frequency to frequency, and frequencies within a cell do so from direction to direction (a rank-1 lattice: Niederreiter 1992, ch.
 /// 5), so that what errors are left do not add up.
