@@ -14,6 +14,7 @@
 //! | [`outlier`] | readings that cannot be, replaced by their neighbour |
 //! | [`quality`] | the QARTOD tests of a record, its repair, rotor ripples |
 //! | [`crests`] | crest and height distributions, the highest wave in time and in space |
+//! | [`forecast`] | the sea some seconds ahead at a spot, with its errors, and its quiet moments |
 //! | [`filter`], [`spline`] | splitting a record by frequency; uneven samples to even ones |
 //!
 //! Elevation is positive up, metres; densities are one-sided, m²/Hz.
@@ -26,6 +27,7 @@ pub mod crests;
 pub mod crossing;
 pub mod dispersion;
 pub mod filter;
+pub mod forecast;
 pub mod height;
 pub mod interval;
 pub mod outlier;

@@ -233,7 +233,7 @@ impl Exceedance for Rice {
 }
 
 /// The probability that a standard normal variable exceeds `z`.
-pub(super) fn normal_exceedance(z: f64) -> f64 {
+pub(crate) fn normal_exceedance(z: f64) -> f64 {
     // 1 − P loses the far tail to cancellation; past z = 5 its asymptotic fraction (Abramowitz & Stegun 26.2.14) does not.
     if z > 5.0 {
         let mut fraction = z;
