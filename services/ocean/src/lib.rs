@@ -14,6 +14,7 @@
 //! | [`outlier`] | readings that cannot be, replaced by their neighbour |
 //! | [`quality`] | the QARTOD tests of a record, its repair, rotor ripples |
 //! | [`crests`] | crest and height distributions, the highest wave in time and in space |
+//! | [`space`] | length, direction and spread of waves from a film of the surface |
 //! | [`filter`], [`spline`] | splitting a record by frequency; uneven samples to even ones |
 //!
 //! Elevation is positive up, metres; densities are one-sided, m²/Hz.
@@ -31,6 +32,7 @@ pub mod interval;
 pub mod outlier;
 pub mod quality;
 pub mod record;
+pub mod space;
 mod special;
 pub mod spectrum;
 pub mod spline;
