@@ -6,14 +6,30 @@
 //! |---|---|
 //! | [`film`] | elevation on a grid over time, checked, its holes filled |
 //! | [`welch3`] | the spectrum over wavenumber and frequency |
+//! | [`water`], [`shell`] | dispersion over a current; what of a spectrum lies on it |
+//! | [`moments`], [`statistics`] | directions by frequency; wavelength, direction, spread, slopes |
+//! | [`directional`] | S(f, θ) and the plane waves it stands for |
+//! | [`entropy`] | S(f, θ) of first moments by maximum entropy |
 
+pub mod directional;
+pub mod entropy;
 mod fill;
 pub mod film;
+pub mod moments;
+pub mod shell;
+pub mod statistics;
 #[cfg(test)]
 mod synthetic;
 #[cfg(test)]
 mod tests;
+pub mod water;
 pub mod welch3;
 
+pub use directional::{DirectionalSpectrum, WaveLine};
+pub use entropy::maximum_entropy;
 pub use film::{Film, FilmError, Shape};
+pub use moments::FourierMoments;
+pub use shell::{OnShell, Shell};
+pub use statistics::FilmStatistics;
+pub use water::Water;
 pub use welch3::{SpaceError, SpectralCell, Spectrum3, Welch3};

@@ -3,7 +3,7 @@
 use approx::assert_relative_eq;
 use std::f64::consts::TAU;
 
-use super::synthetic::{PlaneWave, elevations, film};
+use super::synthetic::{PlaneWave, Sea, elevations, film, off_deg};
 use super::*;
 use crate::dispersion::Depth;
 
@@ -99,4 +99,58 @@ fn segments_must_fit() {
     assert_eq!(Welch3::with_segments_of_s(f64::NAN, &film).segment_frames, 8);
     assert_eq!(Welch3::with_segments_of_s(1e300, &film).segment_frames, 60);
     assert_eq!(film.elevation_m(), elevations(&[PlaneWave::from(0.1, 0.5, 0.3, 0.0, Depth::DEEP)], SMALL, 0.1, 5.0));
+}
+
+/// Scratch: prints what is found.
+#[test]
+fn explore() {
+    for (rows, cell, rate, frames, segment) in [
+        (100, 0.2, 4.0, 480, 240),
+        (100, 0.2, 4.0, 480, 120),
+        (40, 0.1, 4.0, 480, 240),
+        (40, 0.1, 4.0, 480, 120),
+        (40, 0.1, 2.0, 120, 60),
+    ] {
+        for s in [3.0, 10.0, 25.0] {
+            for water in [Water::DEEP] {
+                let sea = Sea::new(0.1, 2.0, s, 200.0);
+                let shape = Shape { rows, cols: rows, frames };
+                let mut lines = Vec::new();
+                for seed in 0..4 {
+                    let spectrum = Welch3 { segment_frames: segment }.spectrum(&sea.film(shape, cell, rate, seed)).unwrap();
+                    let raw = spectrum.statistics(&water).unwrap();
+                    let (on, share) = spectrum.on_shell(&Shell::new(water));
+                    let on = on.statistics(&water).unwrap();
+                    for st in [raw, on] {
+                        lines.push([
+                            off_deg(st.direction_from_rad, sea.from_rad),
+                            st.spread_rad,
+                            st.wavelength_mean_m,
+                            st.wavelength_peak_m,
+                            st.mss,
+                            st.mss_along / st.mss,
+                            st.h_m0_m,
+                            share.energy_share,
+                            off_deg(st.direction_peak_from_rad, sea.from_rad),
+                        ]);
+                    }
+                }
+                let m2 = s * (s - 1.0) / ((s + 1.0) * (s + 2.0));
+                println!(
+                    "{rows}x{cell} seg {segment} s {s}: spread {:.3} L {:.2} Lp {:.2} mss {:.5} along {:.3}",
+                    (2.0 / (s + 1.0)).sqrt(),
+                    TAU * sea.moment_k(0) / sea.moment_k(1),
+                    crate::dispersion::wavelength_m(2.0, Depth::DEEP),
+                    sea.moment_k(2),
+                    0.5 * (1.0 + m2)
+                );
+                for l in lines.iter().step_by(2) {
+                    println!("  raw {:.3?}", l);
+                }
+                for l in lines.iter().skip(1).step_by(2) {
+                    println!("  on  {:.3?}", l);
+                }
+            }
+        }
+    }
 }

@@ -160,16 +160,10 @@ impl Spectrum3 {
         self.rows * (self.cols / 2 + 1)
     }
 
-    /// How often a stored wavenumber counts: twice where its opposite is not stored. Along k_east = 0 both are; one takes all.
+    /// How often a stored wavenumber counts: for itself and for its opposite, of which [`Self::grid`] tells one only.
     fn sides(&self, index: usize) -> f64 {
         let (i, j) = (index % self.rows, index / self.rows);
-        if j > 0 || (i > 0 && 2 * i < self.rows) {
-            2.0
-        } else if i == 0 {
-            1.0
-        } else {
-            0.0
-        }
+        if j == 0 && i == 0 { 1.0 } else { 2.0 }
     }
 
     /// Distances between wavenumbers to the north and to the east, radians per metre.
@@ -198,18 +192,21 @@ impl Spectrum3 {
     }
 
     /// Every wavenumber stored, as the components to the north and to the east of where waves of positive frequency come **from**, radians
-    /// per metre, with its variances by frequency as a transform has them. Wavenumbers at half the sampling rate, whose sign is not known,
-    /// are left out.
-    pub(super) fn wavenumbers(&self) -> impl Iterator<Item = ([f64; 2], &[f32])> {
+    /// per metre. `None` for those at half the sampling rate, whose sign is not known, and for those whose opposite takes it all.
+    pub(super) fn grid(&self) -> impl Iterator<Item = Option<[f64; 2]>> + use<> {
         let [dk_north, dk_east] = self.dk_radpm();
-        self.variance_m2.chunks_exact(self.segment_frames).enumerate().filter_map(move |(index, variances)| {
-            let (i, j) = (index % self.rows, index / self.rows);
-            if 2 * i == self.rows || 2 * j == self.cols {
-                return None;
-            }
-            let i = if 2 * i < self.rows { i as f64 } else { i as f64 - self.rows as f64 };
-            Some(([i * dk_north, j as f64 * dk_east], variances))
+        let (rows, cols) = (self.rows, self.cols);
+        (0..self.plane_len()).map(move |index| {
+            let (i, j) = (index % rows, index / rows);
+            let north = if 2 * i < rows { i as f64 } else { i as f64 - rows as f64 };
+            let known = 2 * i != rows && 2 * j != cols && (j > 0 || north >= 0.0);
+            known.then_some([north * dk_north, j as f64 * dk_east])
         })
+    }
+
+    /// Every wavenumber of [`Self::grid`] with its variances by frequency as a transform has them.
+    pub(super) fn wavenumbers(&self) -> impl Iterator<Item = ([f64; 2], &[f32])> {
+        self.grid().zip(self.variance_m2.chunks_exact(self.segment_frames)).filter_map(|(k, variances)| Some((k?, variances)))
     }
 
     /// Every cell of non-zero frequency: wavenumber to the north and to the east of where its waves go **to**, radians per metre, frequency
