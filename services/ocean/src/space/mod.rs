@@ -9,12 +9,16 @@
 //! | [`water`], [`shell`] | dispersion over a current; what of a spectrum lies on it |
 //! | [`moments`], [`statistics`] | directions by frequency; wavelength, direction, spread, slopes |
 //! | [`directional`] | S(f, θ) and the plane waves it stands for |
+//! | [`gauges`], [`array`] | S(f, θ) of virtual gauges by maximum likelihood, of films shorter than their waves and without planes, too |
 //! | [`entropy`] | S(f, θ) of first moments by maximum entropy |
 
+pub mod array;
 pub mod directional;
 pub mod entropy;
 mod fill;
 pub mod film;
+pub mod gauges;
+mod hermitian;
 pub mod moments;
 pub mod shell;
 pub mod statistics;
@@ -25,9 +29,11 @@ mod tests;
 pub mod water;
 pub mod welch3;
 
+pub use array::Array;
 pub use directional::{DirectionalSpectrum, WaveLine};
 pub use entropy::maximum_entropy;
 pub use film::{Film, FilmError, Shape};
+pub use gauges::{Gauges, Removed};
 pub use moments::FourierMoments;
 pub use shell::{OnShell, Shell};
 pub use statistics::FilmStatistics;

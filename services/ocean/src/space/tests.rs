@@ -104,52 +104,49 @@ fn segments_must_fit() {
 /// Scratch: prints what is found.
 #[test]
 fn explore() {
-    for (rows, cell, rate, frames, segment) in [
-        (100, 0.2, 4.0, 480, 240),
-        (100, 0.2, 4.0, 480, 120),
-        (40, 0.1, 4.0, 480, 240),
-        (40, 0.1, 4.0, 480, 120),
-        (40, 0.1, 2.0, 120, 60),
-    ] {
+    for (rows, cell, rate, frames, segment) in [(20, 0.2, 4.0, 960, 48), (20, 0.2, 4.0, 960, 96)] {
         for s in [3.0, 10.0, 25.0] {
-            for water in [Water::DEEP] {
-                let sea = Sea::new(0.1, 2.0, s, 200.0);
-                let shape = Shape { rows, cols: rows, frames };
-                let mut lines = Vec::new();
-                for seed in 0..4 {
-                    let spectrum = Welch3 { segment_frames: segment }.spectrum(&sea.film(shape, cell, rate, seed)).unwrap();
-                    let raw = spectrum.statistics(&water).unwrap();
-                    let (on, share) = spectrum.on_shell(&Shell::new(water));
-                    let on = on.statistics(&water).unwrap();
-                    for st in [raw, on] {
-                        lines.push([
-                            off_deg(st.direction_from_rad, sea.from_rad),
-                            st.spread_rad,
-                            st.wavelength_mean_m,
-                            st.wavelength_peak_m,
-                            st.mss,
-                            st.mss_along / st.mss,
-                            st.h_m0_m,
-                            share.energy_share,
-                            off_deg(st.direction_peak_from_rad, sea.from_rad),
-                        ]);
+            let sea = Sea::new(0.1, 2.0, s, 200.0);
+            let shape = Shape { rows, cols: rows, frames };
+            println!(
+                "{rows}x{cell} seg {segment} s {s}: spread {:.3} L {:.2}",
+                (2.0 / (s + 1.0)).sqrt(),
+                TAU * sea.moment_k(0) / sea.moment_k(1)
+            );
+            let films: Vec<_> = (0..3).map(|seed| sea.film(shape, cell, rate, seed)).collect();
+            for removed in [Removed::Nothing, Removed::Plane] {
+                for gauges in [
+                    Gauges::Modes { order: 2 },
+                    Gauges::Modes { order: 3 },
+                    Gauges::Modes { order: 4 },
+                    Gauges::Points { side: 4 },
+                ] {
+                    for (iterations, loading) in [(0, 1e-3), (30, 1e-2), (30, 1e-3), (30, 1e-4), (100, 1e-3)] {
+                        let array = Array { gauges, iterations, loading, ..Array::new(removed, segment, (0.35, 1.5)) };
+                        let mut all = Vec::new();
+                        for film in &films {
+                            let Ok(found) = array.spectrum(film, &Water::DEEP) else { continue };
+                            let overall = found.overall().unwrap();
+                            let lengths = found.wavelengths_m(&Water::DEEP).unwrap();
+                            all.push([
+                                off_deg(overall.direction_from_rad(), sea.from_rad),
+                                overall.spread_rad(),
+                                4.0 * found.variance_m2().sqrt(),
+                                lengths.1,
+                            ]);
+                        }
+                        let means = [0, 1, 2, 3].map(|i| all.iter().map(|a| a[i]).sum::<f64>() / all.len() as f64);
+                        println!(
+                            "  {removed:?} {gauges:?} it {iterations} load {loading}: {means:.3?}   {:.3?}",
+                            all.iter().map(|a| a[1]).collect::<Vec<_>>()
+                        );
                     }
                 }
-                let m2 = s * (s - 1.0) / ((s + 1.0) * (s + 2.0));
-                println!(
-                    "{rows}x{cell} seg {segment} s {s}: spread {:.3} L {:.2} Lp {:.2} mss {:.5} along {:.3}",
-                    (2.0 / (s + 1.0)).sqrt(),
-                    TAU * sea.moment_k(0) / sea.moment_k(1),
-                    crate::dispersion::wavelength_m(2.0, Depth::DEEP),
-                    sea.moment_k(2),
-                    0.5 * (1.0 + m2)
-                );
-                for l in lines.iter().step_by(2) {
-                    println!("  raw {:.3?}", l);
-                }
-                for l in lines.iter().skip(1).step_by(2) {
-                    println!("  on  {:.3?}", l);
-                }
+            }
+            for film in &films {
+                let spectrum = Welch3 { segment_frames: 240 }.spectrum(film).unwrap();
+                let st = spectrum.statistics(&Water::DEEP).unwrap();
+                println!("  3D {:.3} {:.3}", off_deg(st.direction_from_rad, sea.from_rad), st.spread_rad);
             }
         }
     }
