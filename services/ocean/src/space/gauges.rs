@@ -8,10 +8,12 @@ use super::welch3::SpaceError;
 /// What an array is made of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Gauges {
-    /// Single cells, evenly spaced from edge to edge: so many along each side.
+    /// Squares of cells, evenly spaced from edge to edge: each gauge is the mean of its cells.
     Points {
-        /// Along each side.
+        /// Gauges along each side of the film.
         side: usize,
+        /// Cells along each side of a gauge: 1 is a point, more have less noise.
+        cells: usize,
     },
     /// Products of Gram's polynomials (orthogonal on the cells) up to this order in all: mean, two tilts, three curvatures, and so on. Each
     /// is a sum over all cells, which averages their noise. For films up to about a wavelength.
@@ -83,15 +85,16 @@ impl Sensors {
                 }
                 (sides.map(|n| gram(n, order + 1)), all[off.len().min(all.len())..].to_vec())
             }
-            Gauges::Points { side } => {
-                if side < 2 || side > Gauges::COUNT_MAX || sides.iter().any(|n| *n < side) {
+            Gauges::Points { side, cells } => {
+                if side < 2 || side > Gauges::COUNT_MAX || cells < 1 || sides.iter().any(|n| *n < side || *n < cells) {
                     return Err(refuse(side.saturating_mul(side)));
                 }
                 let base = removed.orders();
                 let weights = sides.map(|n| {
                     let points = (0..side).map(|i| {
                         let mut weights = vec![0.0; n];
-                        weights[(i * (n - 1) + (side - 1) / 2) / (side - 1)] = 1.0;
+                        let first = (i * (n - cells) + (side - 1) / 2) / (side - 1);
+                        weights[first..first + cells].fill(1.0 / cells as f64);
                         weights
                     });
                     gram(n, base).into_iter().chain(points).collect::<Vec<_>>()
@@ -201,7 +204,7 @@ mod tests {
         let film = film(&[wave], SHAPE, 0.2, 4.0);
         // The phase where the array has its middle.
         let middle = 0.2 * (9.5 * wave.k_north_radpm + 11.5 * wave.k_east_radpm);
-        for gauges in [Gauges::Modes { order: 3 }, Gauges::Points { side: 4 }] {
+        for gauges in [Gauges::Modes { order: 3 }, Gauges::Points { side: 4, cells: 3 }] {
             for removed in [Removed::Nothing, Removed::Mean, Removed::Plane] {
                 let sensors = Sensors::new(gauges, removed, SHAPE, 0.2).unwrap();
                 let transfer = sensors.transfer([k * 0.7_f64.cos(), k * 0.7_f64.sin()]);
@@ -217,7 +220,7 @@ mod tests {
     fn of_a_plane_nothing_is_left_without_planes() {
         let plane = (0..960).map(|i| 0.3 + 0.02 * (i / 24 % 20) as f32 - 0.01 * (i % 24) as f32).collect();
         let film = Film::new(plane, SHAPE, 0.2, 4.0).unwrap();
-        for gauges in [Gauges::Modes { order: 3 }, Gauges::Points { side: 4 }] {
+        for gauges in [Gauges::Modes { order: 3 }, Gauges::Points { side: 4, cells: 3 }] {
             let sensors = Sensors::new(gauges, Removed::Plane, SHAPE, 0.2).unwrap();
             assert!(sensors.read(&film).iter().all(|z| z.abs() < 1e-5));
         }
@@ -231,7 +234,10 @@ mod tests {
             assert!(new(Gauges::Modes { order: bad }).is_err(), "{bad}");
         }
         for bad in [0, 1, 9, usize::MAX] {
-            assert!(new(Gauges::Points { side: bad }).is_err(), "{bad}");
+            assert!(new(Gauges::Points { side: bad, cells: 1 }).is_err(), "{bad}");
+        }
+        for bad in [0, 21, usize::MAX] {
+            assert!(new(Gauges::Points { side: 4, cells: bad }).is_err(), "{bad}");
         }
     }
 }

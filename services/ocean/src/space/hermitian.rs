@@ -44,6 +44,18 @@ impl Cholesky {
         }
         form
     }
+    /// A⁻¹ h in `work`, and hᴴ A⁻¹ h.
+    pub(super) fn solve(&self, h: &[Complex64], work: &mut [Complex64]) -> f64 {
+        let form = self.inverse_form(h, work);
+        for i in (0..self.n).rev() {
+            let mut sum = work[i];
+            for k in i + 1..self.n {
+                sum -= self.lower[k * self.n + i].conj() * work[k];
+            }
+            work[i] = sum / self.lower[i * self.n + i].re;
+        }
+        form
+    }
 }
 
 #[cfg(test)]
@@ -59,6 +71,10 @@ mod tests {
         let h = [c(1.0, 0.0), c(0.0, 2.0)];
         // hᴴ A⁻¹ h = (1·(2·1 + (−i)(2i)) + (−2i)(i·1 + 2·2i))/3 = (4 + 10)/3.
         assert!((root.inverse_form(&h, &mut [c(0.0, 0.0); 2]) - 14.0 / 3.0).abs() < 1e-12);
+        let mut solved = [c(0.0, 0.0); 2];
+        root.solve(&h, &mut solved);
+        // (2·1 − i·2i, i·1 + 2·2i)/3.
+        assert!((solved[0] - c(4.0 / 3.0, 0.0)).norm() < 1e-12 && (solved[1] - c(0.0, 5.0 / 3.0)).norm() < 1e-12);
         assert!(Cholesky::of(&[c(1.0, 0.0), c(2.0, 0.0), c(2.0, 0.0), c(1.0, 0.0)], 2).is_none());
         assert!(Cholesky::of(&[c(f64::NAN, 0.0)], 1).is_none());
     }

@@ -19,6 +19,7 @@ mod fill;
 pub mod film;
 pub mod gauges;
 mod hermitian;
+mod likelihood;
 pub mod moments;
 pub mod shell;
 pub mod statistics;
@@ -29,7 +30,7 @@ mod tests;
 pub mod water;
 pub mod welch3;
 
-pub use array::Array;
+pub use array::{Array, Method};
 pub use directional::{DirectionalSpectrum, WaveLine};
 pub use entropy::maximum_entropy;
 pub use film::{Film, FilmError, Shape};

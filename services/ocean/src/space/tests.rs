@@ -103,26 +103,51 @@ fn segments_must_fit() {
 
 /// Scratch: prints what is found.
 #[test]
-fn explore() {
-    for (rows, cell, rate, frames, segment) in [(20, 0.2, 4.0, 960, 48), (20, 0.2, 4.0, 960, 96)] {
-        for s in [3.0, 10.0, 25.0] {
-            let sea = Sea::new(0.1, 2.0, s, 200.0);
-            let shape = Shape { rows, cols: rows, frames };
-            println!(
-                "{rows}x{cell} seg {segment} s {s}: spread {:.3} L {:.2}",
-                (2.0 / (s + 1.0)).sqrt(),
-                TAU * sea.moment_k(0) / sea.moment_k(1)
-            );
-            let films: Vec<_> = (0..3).map(|seed| sea.film(shape, cell, rate, seed)).collect();
+fn explore10() {
+    explore(10.0);
+}
+#[test]
+fn explore25() {
+    explore(25.0);
+}
+fn explore(s: f64) {
+    use rand::{Rng, SeedableRng};
+    use std::fmt::Write;
+    let mut out = String::new();
+    for (rows, cell, rate, frames, noise) in [(20, 0.2, 4.0, 240, 0.0025_f32)] {
+        let sea = Sea::new(0.1, 2.0, s, 200.0);
+        let shape = Shape { rows, cols: rows, frames };
+        writeln!(
+            out,
+            "{rows}x{cell} frames {frames} noise {noise} s {s}: spread {:.3} L {:.2}",
+            (2.0 / (s + 1.0)).sqrt(),
+            TAU * sea.moment_k(0) / sea.moment_k(1)
+        )
+        .unwrap();
+        let films: Vec<_> = (0..8)
+            .map(|seed| {
+                let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+                let mut all = elevations(&sea.waves(400, seed), shape, cell, rate);
+                all.iter_mut().for_each(|z| {
+                    let n: f32 = random.sample(rand_distr::StandardNormal);
+                    *z += noise * n;
+                });
+                Film::new(all, shape, cell, rate).unwrap()
+            })
+            .collect();
+        for segment in [48, 96, 160] {
             for removed in [Removed::Nothing, Removed::Plane] {
-                for gauges in [
-                    Gauges::Modes { order: 2 },
-                    Gauges::Modes { order: 3 },
-                    Gauges::Modes { order: 4 },
-                    Gauges::Points { side: 4 },
-                ] {
-                    for (iterations, loading) in [(0, 1e-3), (30, 1e-2), (30, 1e-3), (30, 1e-4), (100, 1e-3)] {
-                        let array = Array { gauges, iterations, loading, ..Array::new(removed, segment, (0.35, 1.5)) };
+                for gauges in [Gauges::Modes { order: 4 }, Gauges::Points { side: 4, cells: 3 }] {
+                    for (iterations, shared_bins, loading) in
+                        [(30, 1, 1e-3), (100, 0, 1e-3), (100, 1, 1e-3), (100, 1, 1e-2), (100, 3, 1e-3)]
+                    {
+                        let array = Array {
+                            gauges,
+                            method: Method::Fitted { iterations, shared_bins },
+                            loading,
+                            directions: 72,
+                            ..Array::new(removed, segment, (0.35, 1.5))
+                        };
                         let mut all = Vec::new();
                         for film in &films {
                             let Ok(found) = array.spectrum(film, &Water::DEEP) else { continue };
@@ -133,21 +158,17 @@ fn explore() {
                                 overall.spread_rad(),
                                 4.0 * found.variance_m2().sqrt(),
                                 lengths.1,
+                                lengths.0,
                             ]);
                         }
-                        let means = [0, 1, 2, 3].map(|i| all.iter().map(|a| a[i]).sum::<f64>() / all.len() as f64);
-                        println!(
-                            "  {removed:?} {gauges:?} it {iterations} load {loading}: {means:.3?}   {:.3?}",
-                            all.iter().map(|a| a[1]).collect::<Vec<_>>()
-                        );
+                        let means = [0, 1, 2, 3, 4].map(|i| all.iter().map(|a| a[i]).sum::<f64>() / all.len() as f64);
+                        let dev = [0, 1, 2, 3, 4]
+                            .map(|i| (all.iter().map(|a| (a[i] - means[i]).powi(2)).sum::<f64>() / all.len() as f64).sqrt());
+                        writeln!(out, "  seg {segment} {removed:?} {gauges:?} it {iterations} shared {shared_bins} load {loading}: {means:.3?}   {dev:.3?}").unwrap();
                     }
                 }
             }
-            for film in &films {
-                let spectrum = Welch3 { segment_frames: 240 }.spectrum(film).unwrap();
-                let st = spectrum.statistics(&Water::DEEP).unwrap();
-                println!("  3D {:.3} {:.3}", off_deg(st.direction_from_rad, sea.from_rad), st.spread_rad);
-            }
         }
+        println!("{out}");
     }
 }
