@@ -1,4 +1,5 @@
-//! S(f, θ) from an array of virtual gauges of a film.
+//! S(f, θ) from an array of virtual gauges of a film by the maximum likelihood method, extended to any linear gauge (Capon 1969; Isobe, Kondo
+//! and Horikawa 1984: EMLM) and changed until it gives what was found (Pawka 1983; Krogstad, Gordon and Miller 1988: IMLM).
 //!
 //! A film of some metres is shorter than its waves, and shows how they bend the surface rather than how long they are; with the dispersion
 //! relation known, that tells their directions. What has been taken off each frame is left out of the gauges and of what they make of each
@@ -11,32 +12,10 @@ use rustfft::{FftPlanner, num_complex::Complex64};
 use super::directional::DirectionalSpectrum;
 use super::film::Film;
 use super::gauges::{Gauges, Removed, Sensors};
-use super::likelihood::{Steering, fit};
+use super::likelihood::Steering;
 use super::water::Water;
 use super::welch3::{SpaceError, Welch3};
 use crate::welch::Taper;
-
-/// How cross spectra become directions.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Method {
-    /// Maximum likelihood of one direction at a time, for any linear gauge (Capon 1969; Isobe, Kondo and Horikawa 1984): spreads waves too
-    /// far.
-    Emlm,
-    /// The same, changed until what is found gives what was found (Pawka 1983; Krogstad, Gordon and Miller 1988). Wants several times as
-    /// many segments as gauges: with fewer it spreads waves too far.
-    Imlm {
-        /// Changes: 30 will do.
-        iterations: usize,
-    },
-    /// The sea of greatest likelihood: the plane waves whose cross spectra make those measured most likely (Burg, Luenberger and Wenger
-    /// 1982), found by multiplicative steps; neighbouring frequencies share their directions. For films of a minute.
-    Fitted {
-        /// Steps: the more, the narrower.
-        iterations: usize,
-        /// Frequencies to either side that share directions with each.
-        shared_bins: usize,
-    },
-}
 
 /// An array of virtual gauges and how its cross spectra become directions.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,14 +31,17 @@ pub struct Array {
     pub band_hz: (f64, f64),
     /// Directions, evenly spaced.
     pub directions: usize,
-    /// The method.
-    pub method: Method,
+    /// Changes of the first estimate: 0 is EMLM, which spreads waves too far; 30 will do.
+    pub iterations: usize,
+    /// Frequencies to either side whose cross spectra are turned to each and added to its own (Wang and Kaveh 1985). The method wants more
+    /// segments and frequencies than gauges: with fewer it spreads waves too far.
+    pub focused_bins: usize,
     /// White noise allowed for, as a share of the gauges' mean variance: keeps cross spectra of few segments from being singular.
     pub loading: f64,
 }
 
 impl Array {
-    /// Four by four gauges of 3 x 3 cells, 90 directions, [`Method::Fitted`]; segments and band as given.
+    /// Four by four gauges of 3 x 3 cells, 90 directions, 30 iterations, two frequencies to either side; segments and band as given.
     #[must_use]
     pub fn new(removed: Removed, segment_frames: usize, band_hz: (f64, f64)) -> Self {
         Self {
@@ -68,7 +50,8 @@ impl Array {
             segment_frames,
             band_hz,
             directions: 90,
-            method: Method::Fitted { iterations: 100, shared_bins: 1 },
+            iterations: 30,
+            focused_bins: 2,
             loading: 1e-3,
         }
     }
@@ -96,12 +79,13 @@ impl Array {
             .zip(cross.chunks_exact(sensors.len() * sensors.len()))
             .map(|(m, cross)| Steering::new(&sensors, water, TAU * m as f64 * df_hz, directions, cross, self.loading))
             .collect();
-        let rows: Vec<Option<Vec<f64>>> = match self.method {
-            Method::Emlm => steering.iter().map(|s| s.as_ref()?.iterated(0)).collect(),
-            Method::Imlm { iterations } => steering.iter().map(|s| s.as_ref()?.iterated(iterations)).collect(),
-            Method::Fitted { iterations, shared_bins } => fit(&steering, iterations, shared_bins),
-        };
-        let density = rows.into_iter().flat_map(|row| row.unwrap_or_else(|| vec![0.0; directions])).collect();
+        let rows = steering.iter().enumerate().map(|(i, here)| {
+            let here = here.as_ref()?;
+            let near =
+                i.saturating_sub(self.focused_bins)..i.saturating_add(self.focused_bins).saturating_add(1).min(steering.len());
+            here.iterated(&here.focused(steering[near].iter().flatten())?, self.iterations)
+        });
+        let density = rows.flat_map(|row| row.unwrap_or_else(|| vec![0.0; directions])).collect();
         let all = DirectionalSpectrum::new(first * df_hz, df_hz, directions, density).ok_or(SpaceError::NoEnergy)?;
         if all.variance_m2() > 0.0 { Ok(all) } else { Err(SpaceError::NoEnergy) }
     }

@@ -16,6 +16,8 @@ pub(super) struct Steering<'a> {
     /// Measured, m²/Hz.
     cross: &'a [Complex64],
     loading: f64,
+    /// The root of H Hᴴ, a little noise with it.
+    gram: Option<Cholesky>,
 }
 
 impl<'a> Steering<'a> {
@@ -36,13 +38,14 @@ impl<'a> Steering<'a> {
             vectors.extend(sensors.transfer([k * from_rad.cos(), k * from_rad.sin()]));
         }
         let loading = if loading.is_finite() { loading.clamp(1e-9, 1.0) } else { 1e-3 };
-        let new = Self { size: sensors.len(), vectors, dtheta_rad, cross, loading };
+        let mut new = Self { size: sensors.len(), vectors, dtheta_rad, cross, loading, gram: None };
+        new.gram = new.loaded(new.model(&vec![1.0; directions]));
         (new.trace(cross) > 0.0).then_some(new)
     }
 
-    /// S(θ), m²/Hz/rad, by Capon's estimate, and changed so many times by the ratio of what it should give to what it gives.
-    pub(super) fn iterated(&self, iterations: usize) -> Option<Vec<f64>> {
-        let measured = self.capon(self.cross)?;
+    /// S(θ), m²/Hz/rad, by Capon's estimate from `cross`, and changed so many times by the ratio of what it should give to what it gives.
+    pub(super) fn iterated(&self, cross: &[Complex64], iterations: usize) -> Option<Vec<f64>> {
+        let measured = self.capon(cross)?;
         let mut found = measured.clone();
         for _ in 0..iterations {
             let explained = self.capon(&self.model(&found))?;
@@ -100,65 +103,39 @@ impl<'a> Steering<'a> {
         (0..self.size).map(|i| cross[i * self.size + i].re).sum()
     }
 
-    /// The two sides of the likelihood's slope by the density from each direction, times the density's whole: hᴴ M⁻¹ C M⁻¹ h and hᴴ M⁻¹ h
-    /// with the model's M. They are the same where the likelihood is greatest.
-    fn slopes(&self, shape: &[f64], out: &mut [[f64; 2]]) -> Option<()> {
+    /// The cross spectra of `self` and of its neighbours, as the gauges would have had them at this frequency (Wang and Kaveh 1985): each turned
+    /// by the matrix that best makes what the gauges make of waves there what they make of them here.
+    pub(super) fn focused<'b>(&self, near: impl Iterator<Item = &'b Self>) -> Option<Vec<Complex64>>
+    where
+        'a: 'b,
+    {
         let n = self.size;
-        let model = self.model(shape);
-        // The whole that gives the gauges their variance; M is that much larger than the model of the shape.
-        let whole = self.trace(self.cross) / self.trace(&model);
-        if !(whole > 0.0 && whole.is_finite()) {
-            return None;
-        }
-        let root = self.loaded(model)?;
-        let mut work = vec![Complex64::default(); n];
-        for (h, out) in self.vectors.chunks_exact(n).zip(out) {
-            let form = root.solve(h, &mut work);
-            let mut measured = 0.0;
-            for i in 0..n {
-                let row = &self.cross[i * n..i * n + i];
-                // Hermitian: twice the real part of the lower triangle.
-                let sum = row.iter().zip(&work).map(|(c, y)| c * y).sum::<Complex64>();
-                measured += 2.0 * (work[i].conj() * sum).re + self.cross[i * n + i].re * work[i].norm_sqr();
-            }
-            out[0] += measured / whole;
-            out[1] += form;
-        }
-        Some(())
-    }
-}
-
-/// The densities of greatest likelihood at each frequency, m²/Hz/rad: from the same in all directions by `iterations` multiplicative steps, with
-/// the slopes of `shared` frequencies to either side.
-pub(super) fn fit(all: &[Option<Steering<'_>>], iterations: usize, shared: usize) -> Vec<Option<Vec<f64>>> {
-    let Some(first) = all.iter().flatten().next() else { return vec![None; all.len()] };
-    let directions = first.vectors.len() / first.size;
-    let mut shapes = vec![vec![1.0 / TAU; directions]; all.len()];
-    for _ in 0..iterations {
-        let slopes: Vec<Option<Vec<[f64; 2]>>> = all
-            .iter()
-            .zip(&shapes)
-            .map(|(steering, shape)| {
-                let mut slopes = vec![[0.0; 2]; directions];
-                steering.as_ref()?.slopes(shape, &mut slopes)?;
-                Some(slopes)
-            })
-            .collect();
-        for (i, (shape, steering)) in shapes.iter_mut().zip(all).enumerate() {
-            let near = &slopes[i.saturating_sub(shared)..(i + shared + 1).min(slopes.len())];
-            for (j, d) in shape.iter_mut().enumerate() {
-                let [measured, modelled] =
-                    near.iter().flatten().fold([0.0, 0.0], |sum, slopes| [sum[0] + slopes[j][0], sum[1] + slopes[j][1]]);
-                if modelled > 0.0 {
-                    *d *= (measured / modelled).clamp(0.1, 10.0);
+        let mut sum = vec![Complex64::default(); n * n];
+        for other in near {
+            // T = H₀ Hᴴ (H Hᴴ + ε)⁻¹, row by row: (H Hᴴ + ε)⁻¹ is Hermitian, and its product with the conjugate row is the row's conjugate.
+            let root = other.gram.as_ref()?;
+            let mut turn = vec![Complex64::default(); n * n];
+            for (h0, h) in self.vectors.chunks_exact(n).zip(other.vectors.chunks_exact(n)) {
+                for i in 0..n {
+                    for j in 0..n {
+                        turn[i * n + j] += h0[i].conj() * h[j];
+                    }
                 }
             }
-            if let Some(steering) = steering
-                && steering.normalise(shape).is_none()
-            {
-                shape.fill(1.0 / TAU);
+            let mut work = vec![Complex64::default(); n];
+            for row in turn.chunks_exact_mut(n) {
+                root.solve(row, &mut work);
+                row.iter_mut().zip(&work).for_each(|(t, w)| *t = w.conj() * self.dtheta_rad);
+            }
+            for i in 0..n {
+                for j in 0..n {
+                    work[j] = (0..n).map(|k| turn[i * n + k] * other.cross[k * n + j]).sum();
+                }
+                for j in 0..=i {
+                    sum[i * n + j] += (0..n).map(|k| work[k] * turn[j * n + k].conj()).sum::<Complex64>();
+                }
             }
         }
+        Some(sum)
     }
-    all.iter().zip(&shapes).map(|(steering, shape)| steering.as_ref()?.scaled(shape)).collect()
 }

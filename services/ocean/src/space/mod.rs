@@ -10,6 +10,7 @@
 //! | [`moments`], [`statistics`] | directions by frequency; wavelength, direction, spread, slopes |
 //! | [`directional`] | S(f, θ) and the plane waves it stands for |
 //! | [`gauges`], [`array`] | S(f, θ) of virtual gauges by maximum likelihood, of films shorter than their waves and without planes, too |
+//! | [`snapshot`] | what one picture tells |
 //! | [`entropy`] | S(f, θ) of first moments by maximum entropy |
 
 pub mod array;
@@ -22,6 +23,7 @@ mod hermitian;
 mod likelihood;
 pub mod moments;
 pub mod shell;
+pub mod snapshot;
 pub mod statistics;
 #[cfg(test)]
 mod synthetic;
@@ -30,13 +32,14 @@ mod tests;
 pub mod water;
 pub mod welch3;
 
-pub use array::{Array, Method};
+pub use array::Array;
 pub use directional::{DirectionalSpectrum, WaveLine};
 pub use entropy::maximum_entropy;
 pub use film::{Film, FilmError, Shape};
 pub use gauges::{Gauges, Removed};
 pub use moments::FourierMoments;
 pub use shell::{OnShell, Shell};
+pub use snapshot::{Snapshot, WaveAxis};
 pub use statistics::FilmStatistics;
 pub use water::Water;
 pub use welch3::{SpaceError, SpectralCell, Spectrum3, Welch3};
