@@ -41,7 +41,7 @@ pub struct Array {
 }
 
 impl Array {
-    /// Four by four gauges of 3 x 3 cells, 90 directions, 30 iterations, two frequencies to either side; segments and band as given.
+    /// Four by four gauges of 3 x 3 cells, 90 directions, 30 iterations, three frequencies to either side; segments and band as given.
     #[must_use]
     pub fn new(removed: Removed, segment_frames: usize, band_hz: (f64, f64)) -> Self {
         Self {
@@ -51,7 +51,7 @@ impl Array {
             band_hz,
             directions: 90,
             iterations: 30,
-            focused_bins: 2,
+            focused_bins: 3,
             loading: 1e-3,
         }
     }

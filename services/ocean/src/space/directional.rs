@@ -152,3 +152,84 @@ impl DirectionalSpectrum {
         lines
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Water, maximum_entropy};
+    use super::*;
+    use crate::dispersion::wavenumber_radpm;
+    use crate::{CosTwoS, Depth, Jonswap, Spectrum};
+    use approx::assert_relative_eq;
+
+    /// JONSWAP times cos-2s on a grid has the moments m_n of cos-2s (Longuet-Higgins et al. 1963), and its lines carry its variance.
+    #[test]
+    fn cos_two_s_has_its_moments_and_lines() {
+        let (s, from_rad) = (6.0, 5.0_f64);
+        let (jonswap, spreading) = (Jonswap::new(0.2, 2.0, 3.3).unwrap(), CosTwoS::new(s).unwrap());
+        let density: Vec<f64> = (0..100)
+            .flat_map(|i| (0..72).map(move |j| (0.25 + 0.01 * f64::from(i), TAU * f64::from(j) / 72.0)))
+            .map(|(f, theta)| jonswap.density_m2_per_hz(f) * spreading.density_per_rad(theta - from_rad))
+            .collect();
+        let all = DirectionalSpectrum::new(0.25, 0.01, 72, density).unwrap();
+        let overall = all.overall().unwrap();
+        let (m1, m2) = (s / (s + 1.0), s * (s - 1.0) / ((s + 1.0) * (s + 2.0)));
+        assert_relative_eq!(overall.a1, m1 * from_rad.cos(), max_relative = 1e-6);
+        assert_relative_eq!(overall.b1, m1 * from_rad.sin(), max_relative = 1e-6);
+        assert_relative_eq!(overall.a2, m2 * (2.0 * from_rad).cos(), max_relative = 1e-6);
+        assert_relative_eq!(overall.b2, m2 * (2.0 * from_rad).sin(), max_relative = 1e-6);
+        assert_relative_eq!(overall.direction_from_rad(), from_rad, max_relative = 1e-6);
+        assert_relative_eq!(overall.spread_rad(), spreading.spread_rad(), max_relative = 1e-6);
+        let (f_hz, peak_rad) = all.peak().unwrap();
+        assert!((f_hz - 0.5).abs() < 0.006 && (peak_rad - from_rad).abs() < 0.05);
+        let lines = all.lines(&Water::DEEP);
+        assert_relative_eq!(lines.iter().map(|l| l.variance_m2).sum::<f64>(), all.variance_m2(), max_relative = 1e-12);
+        for line in &lines {
+            let k = wavenumber_radpm(line.omega_radps, Depth::DEEP);
+            assert_relative_eq!(line.k_north_radpm.hypot(line.k_east_radpm), k, max_relative = 1e-9);
+        }
+        // Waves go to where they do not come from.
+        let north: f64 = lines.iter().map(|l| l.variance_m2 * l.k_north_radpm).sum();
+        assert!(north * from_rad.cos() < 0.0);
+    }
+
+    /// Lygre and Krogstad: the function has the moments it was made of.
+    #[test]
+    fn entropy_keeps_the_moments() {
+        for s in [1.0, 4.0, 10.0, 40.0] {
+            for from_rad in [0.3, 2.0, 4.4_f64] {
+                let (m1, m2) = (s / (s + 1.0), s * (s - 1.0) / ((s + 1.0) * (s + 2.0)));
+                let given = FourierMoments {
+                    f_hz: 0.5,
+                    density_m2_per_hz: 1.0,
+                    a1: m1 * from_rad.cos(),
+                    b1: m1 * from_rad.sin(),
+                    a2: m2 * (2.0 * from_rad).cos(),
+                    b2: m2 * (2.0 * from_rad).sin(),
+                };
+                let found = DirectionalSpectrum::new(0.5, 0.1, 180, maximum_entropy(&given, 180)).unwrap().moments()[0];
+                assert_relative_eq!(found.density_m2_per_hz, 1.0, max_relative = 1e-9);
+                for (found, given) in [(found.a1, given.a1), (found.b1, given.b1), (found.a2, given.a2), (found.b2, given.b2)] {
+                    assert!((found - given).abs() < 2e-3, "s {s}: {found} {given}");
+                }
+            }
+        }
+        let wild = FourierMoments { f_hz: 0.5, density_m2_per_hz: 1.0, a1: 3.0, b1: f64::NAN, a2: -7.0, b2: 1.0 };
+        assert!(maximum_entropy(&wild, 0).iter().all(|d| d.is_finite() && *d >= 0.0));
+        let wild = FourierMoments { a1: 3.0, b1: 4.0, ..wild };
+        assert!(maximum_entropy(&wild, 90).iter().all(|d| d.is_finite() && *d >= 0.0));
+    }
+
+    #[test]
+    fn what_is_no_spectrum_is_none() {
+        for bad in [f64::NAN, -1.0, f64::INFINITY] {
+            assert!(DirectionalSpectrum::new(0.5, 0.1, 4, vec![bad; 4]).is_none());
+            assert!(DirectionalSpectrum::new(bad, 0.1, 4, vec![1.0; 4]).is_none());
+            assert!(DirectionalSpectrum::new(0.5, bad, 4, vec![1.0; 4]).is_none());
+        }
+        assert!(DirectionalSpectrum::new(0.5, 0.1, 0, Vec::new()).is_none());
+        assert!(DirectionalSpectrum::new(0.5, 0.1, 4, vec![1.0; 5]).is_none());
+        let still = DirectionalSpectrum::new(0.5, 0.1, 4, vec![0.0; 8]).unwrap();
+        assert!(still.overall().is_none() && still.peak().is_none() && still.wavelengths_m(&Water::DEEP).is_none());
+        assert!(still.lines(&Water::DEEP).is_empty());
+    }
+}

@@ -22,6 +22,8 @@ pub mod gauges;
 mod hermitian;
 mod likelihood;
 pub mod moments;
+#[cfg(test)]
+mod sea_tests;
 pub mod shell;
 pub mod snapshot;
 pub mod statistics;

@@ -167,7 +167,7 @@ mod tests {
             let found = film(&[wave], SHAPE, 0.2, 4.0).snapshot(0).unwrap();
             let length_m = wavelength_m(1.0 / 0.7, Depth::DEEP);
             assert!((found.wavelength_mean_m / length_m - 1.0).abs() < 0.01, "{found:?} {length_m}");
-            assert!((found.wavelength_peak_m / length_m - 1.0).abs() < 0.01, "{found:?} {length_m}");
+            assert!((found.wavelength_peak_m / length_m - 1.0).abs() < 0.05, "{found:?} {length_m}");
             assert!(off_deg(found.axis.nearer_to_rad(from_deg.to_radians()), from_deg.to_radians()).abs() < 0.5, "{found:?}");
             assert!(found.axis_spread_rad < 0.1, "{found:?}");
             let mss = 0.5 * (0.1 * TAU / length_m).powi(2);

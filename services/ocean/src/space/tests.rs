@@ -3,7 +3,7 @@
 use approx::assert_relative_eq;
 use std::f64::consts::TAU;
 
-use super::synthetic::{PlaneWave, Sea, elevations, film, off_deg};
+use super::synthetic::{PlaneWave, elevations, film};
 use super::*;
 use crate::dispersion::Depth;
 
@@ -99,60 +99,4 @@ fn segments_must_fit() {
     assert_eq!(Welch3::with_segments_of_s(f64::NAN, &film).segment_frames, 8);
     assert_eq!(Welch3::with_segments_of_s(1e300, &film).segment_frames, 60);
     assert_eq!(film.elevation_m(), elevations(&[PlaneWave::from(0.1, 0.5, 0.3, 0.0, Depth::DEEP)], SMALL, 0.1, 5.0));
-}
-
-/// Scratch: prints what is found.
-#[test]
-fn explore10() {
-    explore(10.0);
-}
-#[test]
-fn explore25() {
-    explore(25.0);
-}
-fn explore(s: f64) {
-    use rand::{Rng, SeedableRng};
-    let (rows, cell, rate, frames, noise) = (20, 0.2, 4.0, 240, 0.0025_f32);
-    let sea = Sea::new(0.1, 2.0, s, 200.0);
-    let shape = Shape { rows, cols: rows, frames };
-    let films: Vec<_> = (0..6)
-        .map(|seed| {
-            let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
-            let mut all = elevations(&sea.waves(400, seed), shape, cell, rate);
-            all.iter_mut().for_each(|z| {
-                let n: f32 = random.sample(rand_distr::StandardNormal);
-                *z += noise * n;
-            });
-            Film::new(all, shape, cell, rate).unwrap()
-        })
-        .collect();
-    for removed in [Removed::Nothing, Removed::Plane] {
-        for gauges in [Gauges::Points { side: 4, cells: 3 }, Gauges::Modes { order: 4 }] {
-            for (segment_frames, focused_bins, loading) in
-                [(96, 0, 1e-3), (96, 2, 1e-3), (120, 3, 1e-3), (240, 6, 1e-3), (240, 10, 1e-3), (240, 10, 1e-4)]
-            {
-                let array =
-                    Array { gauges, loading, focused_bins, directions: 60, ..Array::new(removed, segment_frames, (0.35, 1.5)) };
-                let mut all = Vec::new();
-                for film in &films {
-                    let Ok(found) = array.spectrum(film, &Water::DEEP) else { continue };
-                    let overall = found.overall().unwrap();
-                    let lengths = found.wavelengths_m(&Water::DEEP).unwrap();
-                    all.push([
-                        off_deg(overall.direction_from_rad(), sea.from_rad),
-                        overall.spread_rad(),
-                        4.0 * found.variance_m2().sqrt(),
-                        lengths.1,
-                        lengths.0,
-                    ]);
-                }
-                let means = [0, 1, 2, 3, 4].map(|i| all.iter().map(|a| a[i]).sum::<f64>() / all.len() as f64);
-                let dev = [0, 1, 2, 3, 4]
-                    .map(|i| (all.iter().map(|a| (a[i] - means[i]).powi(2)).sum::<f64>() / all.len() as f64).sqrt());
-                println!(
-                    "  {s} seg {segment_frames} focus {focused_bins} {removed:?} {gauges:?} load {loading}: {means:.3?}   {dev:.3?}"
-                );
-            }
-        }
-    }
 }
