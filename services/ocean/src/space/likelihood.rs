@@ -8,6 +8,9 @@ use super::gauges::Sensors;
 use super::hermitian::Cholesky;
 use super::water::Water;
 
+/// Noise allowed for where cross spectra are turned: what is less than that of a wave is not made up.
+const FOCUS_LOADING: f64 = 1e-6;
+
 /// One frequency: its cross spectra, and what the gauges make of waves of it from each direction.
 pub(super) struct Steering<'a> {
     size: usize,
@@ -39,7 +42,7 @@ impl<'a> Steering<'a> {
         }
         let loading = if loading.is_finite() { loading.clamp(1e-9, 1.0) } else { 1e-3 };
         let mut new = Self { size: sensors.len(), vectors, dtheta_rad, cross, loading, gram: None };
-        new.gram = new.loaded(new.model(&vec![1.0; directions]));
+        new.gram = new.loaded(new.model(&vec![1.0; directions]), FOCUS_LOADING);
         (new.trace(cross) > 0.0).then_some(new)
     }
 
@@ -64,15 +67,15 @@ impl<'a> Steering<'a> {
     }
 
     /// `cross` with the noise allowed for, as its root.
-    fn loaded(&self, mut cross: Vec<Complex64>) -> Option<Cholesky> {
-        let noise = self.loading * self.trace(&cross) / self.size as f64;
+    fn loaded(&self, mut cross: Vec<Complex64>, loading: f64) -> Option<Cholesky> {
+        let noise = loading * self.trace(&cross) / self.size as f64;
         (0..self.size).for_each(|i| cross[i * self.size + i] += noise);
         Cholesky::of(&cross, self.size)
     }
 
     /// Capon's estimate 1/hᴴ C⁻¹ h, made 1 over the circle.
     fn capon(&self, cross: &[Complex64]) -> Option<Vec<f64>> {
-        let root = self.loaded(cross.to_vec())?;
+        let root = self.loaded(cross.to_vec(), self.loading)?;
         let mut work = vec![Complex64::default(); self.size];
         let forms = self.vectors.chunks_exact(self.size).map(|h| 1.0 / root.inverse_form(h, &mut work));
         let mut all: Vec<f64> = forms.collect();

@@ -50,6 +50,18 @@ impl FourierMoments {
             b2: sum(&|m| m.b2) / energy,
         })
     }
+
+    /// The moments of each frequency with those of `bins` to either side, each by its energy; densities as they are. Of few segments single
+    /// frequencies' moments scatter so much that no direction function has them: smooth before [`super::maximum_entropy`].
+    #[must_use]
+    pub fn smoothed(all: &[Self], bins: usize) -> Vec<Self> {
+        let near = |i: usize| &all[i.saturating_sub(bins)..i.saturating_add(bins).saturating_add(1).min(all.len())];
+        let one = |(i, own): (usize, &Self)| {
+            let mean = Self::overall(near(i)).unwrap_or(*own);
+            Self { f_hz: own.f_hz, density_m2_per_hz: own.density_m2_per_hz, ..mean }
+        };
+        all.iter().enumerate().map(one).collect()
+    }
 }
 
 /// Mean direction of first moments, radians from 0 to 2π.

@@ -65,6 +65,7 @@ fn a_film_shorter_than_its_waves_tells_directions_by_moments() {
                 let spectrum = Welch3 { segment_frames: 240 }.spectrum(&sea.film(SMALL, 0.2, 4.0, seed)).unwrap();
                 let moments = spectrum.on_shell(&Shell::new(Water::DEEP)).0.moments(&Water::DEEP);
                 let overall = FourierMoments::overall(&moments).unwrap();
+                let moments = FourierMoments::smoothed(&moments, 4);
                 let entropy = DirectionalSpectrum::by_entropy(&moments, (0.3, 1.5), 120).unwrap();
                 (overall, entropy.overall().unwrap(), entropy.wavelengths_m(&Water::DEEP).unwrap())
             })
@@ -74,7 +75,9 @@ fn a_film_shorter_than_its_waves_tells_directions_by_moments() {
         {
             let direction = mean(all.iter().map(|x| off_deg(of(x).direction_from_rad(), sea.from_rad)));
             assert!(direction.abs() < 2.0, "s {s}: {direction}");
-            near(mean(all.iter().map(|x| of(x).spread_rad())), spread_of(s), 0.1);
+            let spread = mean(all.iter().map(|x| of(x).spread_rad()));
+            println!("short s {s}: {direction:.2} {:+.1} %", 100.0 * (spread / spread_of(s) - 1.0));
+            near(spread, spread_of(s), 0.1);
         }
         near(mean(all.iter().map(|x| x.2.1)), TAU * sea.moment_k(0) / sea.moment_k(1), 0.04);
         near(mean(all.iter().map(|x| x.2.0)), crate::dispersion::wavelength_m(2.0, Depth::DEEP), 0.06);
@@ -82,12 +85,12 @@ fn a_film_shorter_than_its_waves_tells_directions_by_moments() {
 }
 
 /// What an array finds of films: directions off, spreads, H_m0 and mean wavelengths.
-fn array(sea: &Sea, shape: Shape, removed: Removed, noise_m: f32, seeds: std::ops::Range<u64>) -> Vec<[f64; 4]> {
+fn array(sea: &Sea, shape: Shape, removed: Removed, focused_bins: usize, seeds: std::ops::Range<u64>) -> Vec<[f64; 4]> {
     seeds
         .map(|seed| {
             let mut random = ChaCha8Rng::seed_from_u64(1000 + seed);
             let mut all = elevations(&sea.waves(400, seed), shape, 0.2, 4.0);
-            all.iter_mut().for_each(|z| *z += noise_m * random.sample::<f32, _>(rand_distr::StandardNormal));
+            all.iter_mut().for_each(|z| *z += 0.002 * random.sample::<f32, _>(rand_distr::StandardNormal));
             if removed == Removed::Plane {
                 // As patches that are levelled frame by frame: any plane may be missing.
                 for (i, z) in all.iter_mut().enumerate() {
@@ -96,7 +99,8 @@ fn array(sea: &Sea, shape: Shape, removed: Removed, noise_m: f32, seeds: std::op
                 }
             }
             let film = Film::new(all, shape, 0.2, 4.0).unwrap();
-            let found = Array::new(removed, 120, (0.35, 1.5)).spectrum(&film, &Water::DEEP).unwrap();
+            let array = Array { focused_bins, ..Array::new(removed, 120, (0.35, 1.5)) };
+            let found = array.spectrum(&film, &Water::DEEP).unwrap();
             let overall = found.overall().unwrap();
             let (_, wavelength_m) = found.wavelengths_m(&Water::DEEP).unwrap();
             let direction = off_deg(overall.direction_from_rad(), sea.from_rad);
@@ -112,7 +116,7 @@ fn a_film_without_planes_tells_directions_by_likelihood() {
     for (s, tolerance) in [(3.0, 0.1), (10.0, 0.1), (25.0, 0.15)] {
         let sea = Sea::new(0.1, 2.0, s, 200.0);
         for removed in [Removed::Nothing, Removed::Plane] {
-            let all = array(&sea, shape, removed, 0.002, 0..3);
+            let all = array(&sea, shape, removed, 0, 0..3);
             let [direction, spread, h_m0_m, wavelength_m] = [0, 1, 2, 3].map(|i| mean(all.iter().map(|x| x[i])));
             println!(
                 "s {s} {removed:?}: {direction:.2} {:+.1} % {h_m0_m:.4} {wavelength_m:.3}",
@@ -126,17 +130,17 @@ fn a_film_without_planes_tells_directions_by_likelihood() {
     }
 }
 
-/// The same for one minute: directions hold, spreads come out some 15 % too wide at s 10, 30 % at s 25 (sixteen gauges, three segments).
+/// The same for one minute: directions hold, spreads come out a tenth too wide (sixteen gauges, three segments).
 #[test]
 fn a_minute_tells_directions_but_widens_them() {
     let shape = Shape { frames: 240, ..SMALL };
     let sea = Sea::new(0.1, 2.0, 10.0, 320.0);
     for removed in [Removed::Nothing, Removed::Plane] {
-        let all = array(&sea, shape, removed, 0.002, 0..6);
+        let all = array(&sea, shape, removed, 2, 0..6);
         let [direction, spread, ..] = [0, 1, 2, 3].map(|i| mean(all.iter().map(|x| x[i])));
         println!("minute {removed:?}: {direction:.2} {:+.1} %", 100.0 * (spread / spread_of(10.0) - 1.0));
         assert!(direction.abs() < 2.0, "{removed:?}: {direction}");
-        near(spread, spread_of(10.0), 0.2);
+        near(spread, spread_of(10.0), 0.15);
     }
 }
 
@@ -153,7 +157,7 @@ fn the_shell_keeps_waves_and_drops_the_rest() {
     let (_, share) = noise.on_shell(&Shell { less_noise: true, ..Shell::new(Water::DEEP) });
     assert!(share.on_m2.abs() < 0.02 * share.off_m2, "{share:?}");
 
-    let over = Water { depth: Depth::DEEP, current_mps: [0.8, 0.0] };
+    let over = Water { depth: Depth::DEEP, current_mps: [1.5, 0.0] };
     let from_rad = 160_f64.to_radians();
     let k_radpm = 2.5;
     let (sin, cos) = from_rad.sin_cos();
@@ -178,7 +182,7 @@ fn the_shell_keeps_waves_and_drops_the_rest() {
 
 #[test]
 fn still_seas_and_bad_arrays() {
-    let still = Film::new(vec![0.25; 20 * 20 * 64], Shape { frames: 64, ..SMALL }, 0.2, 4.0).unwrap();
+    let still = Film::new(vec![0.0; 20 * 20 * 64], Shape { frames: 64, ..SMALL }, 0.2, 4.0).unwrap();
     let spectrum = Welch3 { segment_frames: 32 }.spectrum(&still).unwrap();
     assert_eq!(spectrum.clone().on_shell(&Shell::new(Water::DEEP)).1.energy_share, 0.0);
     assert_eq!(spectrum.statistics(&Water::DEEP), None);
@@ -190,6 +194,8 @@ fn still_seas_and_bad_arrays() {
         assert_eq!(Array { band_hz, ..array }.spectrum(&sea, &Water::DEEP), Err(SpaceError::NoEnergy), "{band_hz:?}");
     }
     assert!(matches!(Array { segment_frames: 65, ..array }.spectrum(&sea, &Water::DEEP), Err(SpaceError::TooShort { .. })));
+    let unfit = Array { segment_frames: 7, ..array };
+    assert!(matches!(unfit.spectrum(&sea, &Water::DEEP), Err(SpaceError::TooShort { .. })));
     let none = Gauges::Points { side: 0, cells: 0 };
     assert!(matches!(Array { gauges: none, ..array }.spectrum(&sea, &Water::DEEP), Err(SpaceError::Gauges { .. })));
     let wild = Array { loading: f64::NAN, focused_bins: usize::MAX, directions: 0, ..array };
