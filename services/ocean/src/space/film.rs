@@ -165,8 +165,9 @@ impl Film {
         }
         let filled = unseen as f64 / cells as f64;
         if unseen > 0 {
-            // Written so that a limit of NaN allows nothing.
-            if !(filled <= unseen_max) || unseen == cells {
+            // A limit of NaN allows nothing.
+            let allowed = filled <= unseen_max && unseen < cells;
+            if !allowed {
                 return Err(FilmError::Unseen { unseen: filled, unseen_max });
             }
             fill::fill(&mut elevation_m, shape)?;

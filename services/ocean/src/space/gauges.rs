@@ -86,7 +86,7 @@ impl Sensors {
                 (sides.map(|n| gram(n, order + 1)), all[off.len().min(all.len())..].to_vec())
             }
             Gauges::Points { side, cells } => {
-                if side < 2 || side > Gauges::COUNT_MAX || cells < 1 || sides.iter().any(|n| *n < side || *n < cells) {
+                if !(2..=Gauges::COUNT_MAX).contains(&side) || cells < 1 || sides.iter().any(|n| *n < side || *n < cells) {
                     return Err(refuse(side.saturating_mul(side)));
                 }
                 let base = removed.orders();

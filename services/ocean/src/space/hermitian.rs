@@ -48,10 +48,8 @@ impl Cholesky {
     pub(super) fn solve(&self, h: &[Complex64], work: &mut [Complex64]) -> f64 {
         let form = self.inverse_form(h, work);
         for i in (0..self.n).rev() {
-            let mut sum = work[i];
-            for k in i + 1..self.n {
-                sum -= self.lower[k * self.n + i].conj() * work[k];
-            }
+            let (head, tail) = work.split_at(i + 1);
+            let sum = tail.iter().zip(i + 1..self.n).fold(head[i], |sum, (y, k)| sum - self.lower[k * self.n + i].conj() * y);
             work[i] = sum / self.lower[i * self.n + i].re;
         }
         form

@@ -131,9 +131,9 @@ impl<'a> Steering<'a> {
                 row.iter_mut().zip(&work).for_each(|(t, w)| *t = w.conj() * self.dtheta_rad);
             }
             for i in 0..n {
-                for j in 0..n {
-                    work[j] = (0..n).map(|k| turn[i * n + k] * other.cross[k * n + j]).sum();
-                }
+                work.iter_mut()
+                    .enumerate()
+                    .for_each(|(j, w)| *w = (0..n).map(|k| turn[i * n + k] * other.cross[k * n + j]).sum());
                 for j in 0..=i {
                     sum[i * n + j] += (0..n).map(|k| work[k] * turn[j * n + k].conj()).sum::<Complex64>();
                 }

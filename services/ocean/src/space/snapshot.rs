@@ -104,7 +104,7 @@ impl Film {
             rings[ring][0] += p;
             rings[ring][1] += p * k;
         }
-        if !(variance_m2 > 0.0) {
+        if variance_m2.is_nan() || variance_m2 <= 0.0 {
             return Err(SpaceError::NoEnergy);
         }
         let fourth = rings.iter().map(|ring| ring[0].powi(4)).sum::<f64>();
