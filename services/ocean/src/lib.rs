@@ -15,6 +15,7 @@
 //! | [`quality`] | the QARTOD tests of a record, its repair, rotor ripples |
 //! | [`crests`] | crest and height distributions, the highest wave in time and in space |
 //! | [`forecast`] | the sea some seconds ahead at a spot, with its errors, and its quiet moments |
+//! | [`space`] | length, direction and spread of waves from a film of the surface |
 //! | [`filter`], [`spline`] | splitting a record by frequency; uneven samples to even ones |
 //!
 //! Elevation is positive up, metres; densities are one-sided, m²/Hz.
@@ -33,6 +34,7 @@ pub mod interval;
 pub mod outlier;
 pub mod quality;
 pub mod record;
+pub mod space;
 mod special;
 pub mod spectrum;
 pub mod spline;

@@ -26,7 +26,7 @@ pub enum Taper {
 }
 
 impl Taper {
-    fn at(self, share: f64) -> f64 {
+    pub(crate) fn at(self, share: f64) -> f64 {
         let cos = (std::f64::consts::TAU * share).cos();
         match self {
             Self::Hann => 0.5 - 0.5 * cos,
