@@ -14,6 +14,7 @@
 //! | [`outlier`] | readings that cannot be, replaced by their neighbour |
 //! | [`quality`] | the QARTOD tests of a record, its repair, rotor ripples |
 //! | [`crests`] | crest and height distributions, the highest wave in time and in space |
+//! | [`shape`] | what a spectrum says beyond moments: its scatter, peak, noise, wave systems, fits of JONSWAP and Pierson-Moskowitz |
 //! | [`filter`], [`spline`] | splitting a record by frequency; uneven samples to even ones |
 //!
 //! Elevation is positive up, metres; densities are one-sided, m²/Hz.
@@ -31,6 +32,7 @@ pub mod interval;
 pub mod outlier;
 pub mod quality;
 pub mod record;
+pub mod shape;
 mod special;
 pub mod spectrum;
 pub mod spline;
@@ -43,4 +45,4 @@ pub use record::{Record, RecordError};
 pub use spectrum::{Jonswap, PiersonMoskowitz, Spectrum, SpectrumError};
 pub use spline::Spline;
 pub use spreading::CosTwoS;
-pub use welch::{SampledSpectrum, SpectralStatistics, Taper, Welch};
+pub use welch::{SampledError, SampledSpectrum, SpectralStatistics, Taper, Welch};
