@@ -149,6 +149,12 @@ impl SampledSpectrum {
         &self.density_m2_per_hz
     }
 
+    /// The same frequencies with other densities, by line and density.
+    pub(crate) fn map(&self, of: impl Fn(usize, f64) -> f64) -> Self {
+        let density_m2_per_hz = self.density_m2_per_hz.iter().enumerate().map(|(line, density)| of(line, *density)).collect();
+        Self { df_hz: self.df_hz, density_m2_per_hz }
+    }
+
     /// Frequencies within `low_hz`…`high_hz` and above zero, with their densities.
     pub(crate) fn band(&self, low_hz: f64, high_hz: f64) -> impl Iterator<Item = (f64, f64)> + Clone {
         let df_hz = self.df_hz;
