@@ -1,7 +1,7 @@
 //! One hour of a sea at 10 Hz, step by step: `cargo bench --profile dev -p halcyon-ocean --bench waves`.
 //!
-//! The profile is the one that `make run` uses. "analysis" is all of it but the intervals: quality, waves up and down with their statistics,
-//! spectrum, moments and shape of the spectrum; it is to take 10 ms at most.
+//! The profile is the one that `make run` uses. "analysis" is all of it but the intervals: quality, waves up and down with their
+//! statistics, spectrum and moments; it is to take 10 ms at most.
 
 #![allow(missing_docs, reason = "criterion's macros make functions without any")]
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a bench that cannot run says why and ends")]
@@ -12,6 +12,7 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use halcyon_ocean::crossing::{Crossing, Wave, WaveStatistics, waves};
 use halcyon_ocean::interval::{SpectralIntervals, WaveIntervals};
 use halcyon_ocean::quality::{Assessment, Limits, RawSeries, assess};
+use halcyon_ocean::shape::{Estimate, NoiseFloor, PeakPeriods, Scatter, systems};
 use halcyon_ocean::{Jonswap, Record, SampledSpectrum, SpectralStatistics, Spectrum, Welch};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -20,6 +21,7 @@ use realfft::RealFftPlanner;
 
 const RATE_HZ: f64 = 10.0;
 const SAMPLES: usize = 36_000;
+const SEGMENT_S: f64 = 120.0;
 const BAND_HZ: (f64, f64) = (0.04, 2.0);
 
 /// A Gaussian sea of a JONSWAP spectrum with a millimetre of noise, as instruments have.
@@ -48,7 +50,7 @@ fn both_ways(record: &Record) -> (Vec<Wave>, [Option<WaveStatistics>; 2]) {
 }
 
 fn spectrum(record: &Record) -> SampledSpectrum {
-    Welch::with_segments_of_s(120.0, record).spectrum(record).unwrap()
+    Welch::with_segments_of_s(SEGMENT_S, record).spectrum(record).unwrap()
 }
 
 fn moments(spectrum: &SampledSpectrum) -> (SpectralStatistics, [f64; 3]) {
@@ -76,6 +78,8 @@ fn hour(criterion: &mut Criterion) {
     let (up, _) = both_ways(&record);
     let density = spectrum(&record);
     let (found, _) = moments(&density);
+    let scatter = Scatter::of(&Welch::with_segments_of_s(SEGMENT_S, &record), SAMPLES).unwrap();
+    let estimate = Estimate { spectrum: &density, scatter: &scatter, band_hz: BAND_HZ, noise_m2_per_hz: 2e-7 };
 
     let mut group = criterion.benchmark_group("an hour at 10 Hz");
     group.throughput(Throughput::Elements(SAMPLES as u64));
@@ -87,6 +91,17 @@ fn hour(criterion: &mut Criterion) {
     group.bench_function("intervals of waves", |bencher| bencher.iter(|| WaveIntervals::of(black_box(&up))));
     group.bench_function("intervals of the spectrum", |bencher| {
         bencher.iter(|| SpectralIntervals::of(black_box(&record), &density, &found, BAND_HZ));
+    });
+    group.bench_function("scatter, peak, noise, systems", |bencher| {
+        bencher.iter(|| {
+            let scatter = Scatter::of(&Welch::with_segments_of_s(SEGMENT_S, &record), SAMPLES).unwrap();
+            let noise = NoiseFloor::estimated(&density, &scatter, (1.2, 5.0)).unwrap();
+            (PeakPeriods::of(&density, BAND_HZ), systems(&noise.removed(&density), &scatter, BAND_HZ), noise)
+        });
+    });
+    group.bench_function("fit of JONSWAP", |bencher| bencher.iter(|| black_box(&estimate).jonswap().unwrap()));
+    group.bench_function("fit of Pierson-Moskowitz", |bencher| {
+        bencher.iter(|| black_box(&estimate).pierson_moskowitz().unwrap());
     });
     group.finish();
 }

@@ -1,7 +1,8 @@
 //! JONSWAP and Pierson-Moskowitz spectra fitted to an estimate by maximum likelihood, with 95 % intervals.
 //!
-//! A least-squares fit would hang on the few highest lines, which scatter most: a line's scatter is proportional to its density. The likelihood of
-//! chi-square lines weighs each by that. What is compared with the estimate is the density as the taper spreads it, so that segments may be short.
+//! A least-squares fit would hang on the few highest lines, which scatter most: a line's scatter is proportional to its density.
+//! The likelihood of chi-square lines weighs each by that. What is compared with the estimate is the density as the taper spreads
+//! it, so that segments may be short.
 //!
 //! Intervals are of the logarithms of height, period and γ (all positive), normal, from the information matrix.
 
@@ -54,8 +55,8 @@ impl From<SpectrumError> for FitError {
 pub struct Goodness {
     /// Mean of (ν/2)(Ŝ/E − 1)²: 1 where the estimate scatters about the fit as it should, more where the sea has another shape.
     pub misfit: f64,
-    /// What [`Self::misfit`] is above 1, in its own standard deviations: above 3 the shape is wrong. (Neighbouring lines under one taper
-    /// resemble each other: counted as if the lines were `joint_dof`/`line_dof` as many.)
+    /// What [`Self::misfit`] is above 1, in its own standard deviations: above 3 the shape is wrong. (Neighbouring lines under
+    /// one taper resemble each other: counted as if the lines were `joint_dof`/`line_dof` as many.)
     pub misfit_sigmas: f64,
     /// Lines fitted.
     pub lines: usize,
@@ -96,7 +97,8 @@ pub struct Estimate<'a> {
     pub spectrum: &'a SampledSpectrum,
     /// How it scatters.
     pub scatter: &'a Scatter,
-    /// Frequencies that hold the system and no other, hertz. Above half of the sampling rate's half, folded energy lifts the tail.
+    /// Frequencies that hold the system and no other, hertz. Above half of the sampling rate's half, folded energy lifts the
+    /// tail.
     pub band_hz: (f64, f64),
     /// White noise that the spectrum has on top, m²/Hz; 0 for none.
     pub noise_m2_per_hz: f64,

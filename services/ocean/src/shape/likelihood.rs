@@ -1,7 +1,8 @@
 //! The most likely parameters of a density, given an estimate that scatters about it as chi-square.
 //!
-//! ln L = (ν/2) Σ (−ln E − Ŝ/E) over lines of ν degrees of freedom with the expectation E (Whittle 1953; Bretthorst's "debiased" form, in which E is
-//! what the taper makes of the density, is Sykulski et al. 2019). Fisher's scoring: its information is (ν/2) Σ ∂ln E/∂θᵢ ∂ln E/∂θⱼ.
+//! ln L = (ν/2) Σ (−ln E − Ŝ/E) over lines of ν degrees of freedom with the expectation E (Whittle 1953; that E is to be what the
+//! taper makes of the density: Sykulski et al. 2019, *Biometrika* 106). Fisher's scoring: its information is (ν/2) Σ ∂ln E/∂θᵢ
+//! ∂ln E/∂θⱼ.
 
 /// An expectation with its derivatives by the parameters.
 pub(super) struct Expected<const N: usize> {

@@ -1,8 +1,8 @@
 //! White noise of a measurement, told from the sea's tail and taken off.
 //!
-//! Independent errors of σ in readings taken r times a second are a density of 2 σ²/r at every frequency. The sea's own density falls as f⁻⁴ (Toba 1973)
-//! to f⁻⁵ (Phillips 1958) well above its peak f_p. Both are fitted there together, n + a f⁻ᵖ exp(−p/4 (f_p/f)⁴), by the likelihood of chi-square lines, so
-//! that a tail is not taken for noise.
+//! Independent errors of σ in readings taken r times a second are a density of 2 σ²/r at every frequency. The sea's own density
+//! falls as f⁻⁴ (Toba 1973) to f⁻⁵ (Phillips 1958) well above its peak f_p. Both are fitted there together, n + a f⁻ᵖ exp(−p/4
+//! (f_p/f)⁴), by the likelihood of chi-square lines, so that a tail is not taken for noise.
 
 use super::likelihood::{Expected, Found, climb};
 use super::scatter::Scatter;
@@ -37,8 +37,8 @@ pub struct Moment {
 }
 
 impl NoiseFloor {
-    /// Of independent errors of standard deviation `sigma_m`, known to ± `error_m`, in a record taken `rate_hz` times a second; `None` unless these are
-    /// finite, the rate positive and the others not negative.
+    /// Of independent errors of standard deviation `sigma_m`, known to ± `error_m`, in a record taken `rate_hz` times a second;
+    /// `None` unless these are finite, the rate positive and the others not negative.
     #[must_use]
     pub fn of_sigma(sigma_m: f64, error_m: f64, rate_hz: f64) -> Option<Self> {
         let density_m2_per_hz = 2.0 * sigma_m * sigma_m / rate_hz;
@@ -48,10 +48,11 @@ impl NoiseFloor {
             .then_some(Self { density_m2_per_hz, error_m2_per_hz })
     }
 
-    /// What `spectrum` has from `low_hz` to `high_hz`, where there is no more than the sea's tail: `low_hz` at least twice the peak's frequency.
+    /// What `spectrum` has from `low_hz` to `high_hz`, where there is no more than the sea's tail: `low_hz` at least twice the
+    /// peak's frequency.
     ///
-    /// Single high lines (motors, mains) are left out. The error is that of the fit and of the tail's unknown exponent; an estimate below twice its error is no
-    /// noise that matters. `None` for fewer than eight lines, or where these do not tell.
+    /// Single high lines (motors, mains) are left out. The error is that of the fit and of the tail's unknown exponent; an
+    /// estimate below twice its error is no noise that matters. `None` for fewer than eight lines, or where these do not tell.
     #[must_use]
     pub fn estimated(spectrum: &SampledSpectrum, scatter: &Scatter, (low_hz, high_hz): (f64, f64)) -> Option<Self> {
         let mut lines: Vec<(f64, f64)> = spectrum.band(low_hz, high_hz).collect();
@@ -68,7 +69,8 @@ impl NoiseFloor {
             let kept: Vec<(f64, f64)> = lines.iter().copied().filter(|(f, s)| *s <= factor_max * expected(*f)).collect();
             if kept.len() == lines.len() {
                 let joint = scatter.joint_dof();
-                // Exponents that the record does not rule out, four standard deviations as e⁻⁸: the noise hangs on the exponent a lot.
+                // Exponents that the record does not rule out, four standard deviations as e⁻⁸: the noise hangs on the exponent a
+                // lot.
                 let open = fits.iter().filter(|(_, fit)| 0.5 * joint * (best.likelihood - fit.likelihood) < 8.0);
                 let spread = open.map(|(_, fit)| (fit.theta[0] - best.theta[0]).abs()).fold(0.0, f64::max);
                 let variance = 2.0 * best.covariance[0][0] / joint + spread * spread;
@@ -85,8 +87,8 @@ impl NoiseFloor {
         (0.5 * self.density_m2_per_hz * rate_hz).sqrt()
     }
 
-    /// `spectrum` less the noise. Lines that are lower than it become 0, so that sums over many noisy ones are too high: take those from
-    /// [`Self::moment`].
+    /// `spectrum` less the noise. Lines that are lower than it become 0, so that sums over many noisy ones are too high: take
+    /// those from [`Self::moment`].
     #[must_use]
     pub fn removed(&self, spectrum: &SampledSpectrum) -> SampledSpectrum {
         spectrum.map(|_, density| (density - self.density_m2_per_hz).max(0.0))
@@ -138,116 +140,4 @@ fn fit(lines: &[(f64, f64)], tail: Tail) -> Option<Found<2>> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::shape::tests::{Sea, sampled};
-    use crate::{Jonswap, PiersonMoskowitz, Record, Spectrum, Welch};
-    use approx::assert_relative_eq;
-    use rand::{Rng, SeedableRng};
-    use rand_chacha::ChaCha8Rng;
-
-    const ALL_HZ: (f64, f64) = (0.0, f64::INFINITY);
-
-    fn scatter() -> Scatter {
-        Scatter::independent(40.0).unwrap()
-    }
-
-    #[test]
-    fn a_tail_is_not_taken_for_noise() {
-        let [grown, young] = [1.0, 3.3].map(|gamma| Jonswap::new(0.3, 2.5, gamma).unwrap());
-        for sea in [grown, young] {
-            let spectrum = sampled(0.01, 501, |f_hz| sea.density_m2_per_hz(f_hz));
-            for low_hz in [0.8, 1.2, 2.0] {
-                let floor = NoiseFloor::estimated(&spectrum, &scatter(), (low_hz, 5.0)).unwrap();
-                let left = floor.moment(&spectrum, 0, ALL_HZ);
-                assert_relative_eq!(left.value, 0.3 * 0.3 / 16.0, max_relative = 0.01);
-                // Of the second moment, where the tail counts, no more than 2 % is lost.
-                let m2 = spectrum.moment(2, 0.0, 5.0);
-                assert_relative_eq!(floor.moment(&spectrum, 2, ALL_HZ).value, m2, max_relative = 0.02);
-            }
-        }
-        // Donelan, Hamilton & Hui (1985): Toba's tail.
-        let spectrum = sampled(0.01, 501, |f_hz| if f_hz > 0.0 { f_hz.powi(-4) * (-(0.3 / f_hz).powi(4)).exp() } else { 0.0 });
-        assert!(NoiseFloor::estimated(&spectrum, &scatter(), (0.8, 5.0)).unwrap().density_m2_per_hz < 1e-6);
-    }
-
-    /// A tenth of the sea's variance as noise, with and without a motor's line: theory gives both parts.
-    #[test]
-    fn noise_is_found_and_the_sea_comes_back() {
-        let sea = PiersonMoskowitz::new(0.3, 2.5).unwrap();
-        let m0_m2 = 0.3 * 0.3 / 16.0;
-        let noise_m2_per_hz = 0.1 * m0_m2 / 5.0;
-        for motor in [0.0, 50.0] {
-            let line = |f_hz: f64| if (f_hz - 3.1).abs() < 0.015 { motor * noise_m2_per_hz } else { 0.0 };
-            let bare = sampled(0.01, 501, |f_hz| sea.density_m2_per_hz(f_hz) + noise_m2_per_hz);
-            let spectrum = sampled(0.01, 501, |f_hz| sea.density_m2_per_hz(f_hz) + noise_m2_per_hz + line(f_hz));
-            let floor = NoiseFloor::estimated(&spectrum, &scatter(), (0.9, 5.0)).unwrap();
-            assert_relative_eq!(floor.density_m2_per_hz, noise_m2_per_hz, max_relative = 0.01);
-            assert_relative_eq!(floor.sigma_m(10.0), (0.1 * m0_m2).sqrt(), max_relative = 0.01);
-            assert_relative_eq!(floor.moment(&bare, 0, ALL_HZ).value, m0_m2, max_relative = 0.02);
-            assert_relative_eq!(floor.removed(&bare).moment(0, 0.0, 5.0), m0_m2, max_relative = 0.02);
-        }
-    }
-
-    /// Hours at 10 Hz of a Gaussian sea under noise of 8 mm: the sea's own height within 1 % (2 % of m0) in each, without noise m0 loses less than 1 %,
-    /// and errors are as large as stated.
-    #[test]
-    fn noise_of_records_is_found_as_well_as_stated() {
-        let (rate_hz, samples, sigma_m) = (10.0, 36_000, 0.008);
-        let mut seas = Sea::new(&PiersonMoskowitz::new(0.3, 2.5).unwrap(), rate_hz, 72_000, 3);
-        let mut random = ChaCha8Rng::seed_from_u64(4);
-        let welch = Welch::new(1200);
-        let scatter = Scatter::of(&welch, samples).unwrap();
-        let spectrum = |samples_m: &[f64]| welch.spectrum(&Record::new(samples_m, rate_hz).unwrap()).unwrap();
-        let known = NoiseFloor::of_sigma(sigma_m, 0.0, rate_hz).unwrap();
-        let (mut squares, seeds) = (0.0, 60);
-        for _ in 0..seeds {
-            let clean_m = &seas.draw()[..samples];
-            let noisy_m: Vec<f64> =
-                clean_m.iter().map(|x| x + sigma_m * random.sample::<f64, _>(rand_distr::StandardNormal)).collect();
-            let (clean, noisy) = (spectrum(clean_m), spectrum(&noisy_m));
-            let m0_m2 = clean.moment(0, 0.0, 5.0);
-            let floor = NoiseFloor::estimated(&noisy, &scatter, (1.0, 5.0)).unwrap();
-            squares += ((floor.density_m2_per_hz - known.density_m2_per_hz) / floor.error_m2_per_hz).powi(2);
-            for floor in [floor, known] {
-                assert_relative_eq!(floor.moment(&noisy, 0, ALL_HZ).value, m0_m2, max_relative = 0.02);
-            }
-            let none = NoiseFloor::estimated(&clean, &scatter, (1.0, 5.0)).unwrap();
-            assert_relative_eq!(none.moment(&clean, 0, ALL_HZ).value, m0_m2, max_relative = 0.01);
-        }
-        // Four standard errors of a mean square of 60 are ± 0.73; the exponent's share makes the stated error a little too wide.
-        let mean_square = squares / f64::from(seeds);
-        assert!((0.3..1.75).contains(&mean_square), "{mean_square}");
-    }
-
-    /// 2 σ²/r over all frequencies up to r/2 is σ²; its error is that of a square.
-    #[test]
-    fn a_known_sigma_is_a_known_floor() {
-        let floor = NoiseFloor::of_sigma(0.02, 0.001, 8.0).unwrap();
-        assert_relative_eq!(floor.density_m2_per_hz * 4.0, 0.02 * 0.02, max_relative = 1e-12);
-        assert_relative_eq!(floor.error_m2_per_hz / floor.density_m2_per_hz, 2.0 * 0.05, max_relative = 1e-12);
-        assert_relative_eq!(floor.sigma_m(8.0), 0.02, max_relative = 1e-12);
-        let moment = floor.moment(&sampled(0.5, 9, |_| 1.0), 1, (0.9, 2.1));
-        assert_relative_eq!(moment.value, (1.0 - floor.density_m2_per_hz) * 0.5 * (1.0 + 1.5 + 2.0), max_relative = 1e-12);
-        assert_relative_eq!(moment.error, floor.error_m2_per_hz * 2.25, max_relative = 1e-12);
-        for (sigma_m, error_m, rate_hz) in
-            [(-1.0, 0.0, 1.0), (1.0, -1.0, 1.0), (1.0, 0.0, 0.0), (f64::NAN, 0.0, 1.0), (1e200, 0.0, 1.0)]
-        {
-            assert_eq!(NoiseFloor::of_sigma(sigma_m, error_m, rate_hz), None);
-        }
-    }
-
-    #[test]
-    fn too_little_to_tell_is_none() {
-        let flat = sampled(0.1, 51, |_| 1.0);
-        for band_hz in [(4.5, 5.0), (6.0, 9.0), (f64::NAN, 5.0), (3.0, 2.0)] {
-            assert_eq!(NoiseFloor::estimated(&flat, &scatter(), band_hz), None);
-        }
-        assert_eq!(NoiseFloor::estimated(&sampled(0.1, 51, |_| 0.0), &scatter(), (1.0, 5.0)), None);
-        assert_relative_eq!(
-            NoiseFloor::estimated(&flat, &scatter(), (1.0, 5.0)).unwrap().density_m2_per_hz,
-            1.0,
-            max_relative = 1e-6
-        );
-    }
-}
+mod tests;

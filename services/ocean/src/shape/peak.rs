@@ -1,7 +1,7 @@
 //! Peak periods that do not hang on a single line of an estimate.
 //!
-//! The highest line is one of the spectrum's own frequencies and jumps from record to record. The others trade that scatter for a bias that a broad
-//! peak's slow fall gives; all agree on a single line.
+//! The highest line is one of the spectrum's own frequencies and jumps from record to record. The others trade that scatter for a
+//! bias that a broad peak's slow fall gives; all agree on a single line.
 
 use crate::welch::SampledSpectrum;
 
@@ -10,13 +10,13 @@ use crate::welch::SampledSpectrum;
 pub struct PeakPeriods {
     /// 1/f of the highest line.
     pub line_s: f64,
-    /// 1/f of the top of the parabola through the highest line and its neighbours, as SWAN's T_ps (SWAN team, *User manual*); of the
-    /// highest line where it has no lower neighbour on either side within the band.
+    /// 1/f of the top of the parabola through the highest line and its neighbours, as SWAN's T_ps (SWAN team, *User manual*); of
+    /// the highest line where it has no lower neighbour on either side within the band.
     pub parabola_s: f64,
     /// ∫ S⁴ df / ∫ f S⁴ df (Young 1995, *Ocean Eng.* 22): the least scattered of powers of S; 0.954 T_p of Pierson-Moskowitz.
     pub young_s: f64,
-    /// m₋₂ m₁/m₀², the T_pc of the IAHR's list of sea-state parameters (1989) and of Tucker & Pitt (2001): free of S's shape about the peak,
-    /// but moved by noise at low frequencies; 1.027 T_p of Pierson-Moskowitz.
+    /// m₋₂ m₁/m₀², the T_pc of the IAHR's list of sea-state parameters (1989) and of Tucker & Pitt (2001): free of S's shape
+    /// about the peak, but moved by noise at low frequencies; 1.027 T_p of Pierson-Moskowitz.
     pub moments_s: f64,
     /// ∫ S df / ∫ f S df over the lines about the highest one down to 80 % of it, the Delft method's T_pD of the same list.
     pub delft_s: f64,
@@ -87,8 +87,8 @@ mod tests {
         assert_relative_eq!(found.delft_s, 1.0 / 0.2037, max_relative = 0.02);
     }
 
-    /// Of ν⁻ⁿ exp(−b ν⁻⁴) the integral is ¼ b^(−(n−1)/4) Γ((n−1)/4). With S⁴ (n = 20, b = 5) Young's f is 5^¼ Γ(9/2)/Γ(19/4) f_p, and
-    /// m₋₂ m₁/m₀² is (5/4)^−¼ Γ(3/2) Γ(3/4) T_p. Gammas from Abramowitz & Stegun, table 6.1.
+    /// Of ν⁻ⁿ exp(−b ν⁻⁴) the integral is ¼ b^(−(n−1)/4) Γ((n−1)/4). With S⁴ (n = 20, b = 5) Young's f is 5^¼ Γ(9/2)/Γ(19/4) f_p,
+    /// and m₋₂ m₁/m₀² is (5/4)^−¼ Γ(3/2) Γ(3/4) T_p. Gammas from Abramowitz & Stegun, table 6.1.
     #[test]
     fn pierson_moskowitz_has_closed_forms() {
         let (gamma_4_5, gamma_4_75) = (11.631_728_396_567_45, 2.75 * 3.75 * 1.75 * 0.919_062_526_848_883_2);

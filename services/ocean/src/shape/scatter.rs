@@ -1,7 +1,8 @@
 //! How an estimated spectrum scatters about the true one, and what its taper makes of it.
 //!
-//! A line of a Welch estimate is the true density times χ²_ν/ν. Overlapping segments share samples, and neighbouring lines share a taper's
-//! main lobe, so that there are two numbers of degrees of freedom: of a line by itself, and of what a line adds to a sum over many.
+//! A line of a Welch estimate is the true density times χ²_ν/ν. Overlapping segments share samples, and neighbouring lines share
+//! a taper's main lobe, so that there are two numbers of degrees of freedom: of a line by itself, and of what a line adds to a
+//! sum over many.
 
 use crate::confidence::variance_factors_95;
 use crate::interval::Interval;
@@ -15,7 +16,8 @@ const REACH: usize = 8;
 pub struct Scatter {
     line_dof: f64,
     joint_dof: f64,
-    /// Shares of the true density in an estimated line, at distances of 0, ½, 1, … lines to either side; `None`: it is not spread.
+    /// Shares of the true density in an estimated line, at distances of 0, ½, 1, … lines to either side; `None`: it is not
+    /// spread.
     spread: Option<[f64; REACH + 1]>,
     /// The line at half the sampling rate, which has half the degrees of freedom.
     nyquist: Option<usize>,
@@ -24,8 +26,8 @@ pub struct Scatter {
 impl Scatter {
     /// Of the spectrum that `welch` makes of a record of so many samples; `None` where it makes none.
     ///
-    /// Degrees of freedom of a line are Welch's (1967), ν = 2K/(1 + 2 Σ (1 − j/K) ρⱼ) for K segments, where ρⱼ is the squared correlation
-    /// of the taper with itself j segments later (Percival & Walden 1993, 6.17): 36 K²/(19 K − 1) for Hann's.
+    /// Degrees of freedom of a line are Welch's (1967), ν = 2K/(1 + 2 Σ (1 − j/K) ρⱼ) for K segments, where ρⱼ is the squared
+    /// correlation of the taper with itself j segments later (Percival & Walden 1993, 6.17): 36 K²/(19 K − 1) for Hann's.
     #[must_use]
     pub fn of(welch: &Welch, samples: usize) -> Option<Self> {
         let n = welch.segment_samples;
@@ -54,8 +56,8 @@ impl Scatter {
         })
     }
 
-    /// Of an estimate whose lines are independent and not spread, as of a file that gives degrees of freedom; `None` unless these are
-    /// positive and finite.
+    /// Of an estimate whose lines are independent and not spread, as of a file that gives degrees of freedom; `None` unless these
+    /// are positive and finite.
     #[must_use]
     pub fn independent(dof: f64) -> Option<Self> {
         let good = dof > 0.0 && dof.is_finite();
@@ -68,9 +70,11 @@ impl Scatter {
         self.line_dof
     }
 
-    /// Degrees of freedom that each line adds to a smooth sum of many: fewer than [`Self::line_dof`] where lines resemble their neighbours.
+    /// Degrees of freedom that each line adds to a smooth sum of many: fewer than [`Self::line_dof`] where lines resemble their
+    /// neighbours.
     ///
-    /// The variance of Σ g Ŝ df is (1/T) ∫ g² S² df (Bendat & Piersol 2010, 8.5) over the record's time, less what the tapers' uneven weights on its samples lose.
+    /// The variance of Σ g Ŝ df is (1/T) ∫ g² S² df (Bendat & Piersol 2010, 8.5) over the record's time, less what the tapers'
+    /// uneven weights on its samples lose.
     #[must_use]
     pub fn joint_dof(&self) -> f64 {
         self.joint_dof
@@ -78,8 +82,8 @@ impl Scatter {
 
     /// Between what the true density at each line lies with 95 % confidence, each line by itself, m²/Hz.
     ///
-    /// The mean and, for segments of an even length, half the sampling rate have half the degrees of freedom. What a taper's main lobe
-    /// averages over (1.5 lines for Hann's) is not told apart by any interval.
+    /// The mean and, for segments of an even length, half the sampling rate have half the degrees of freedom. What a taper's main
+    /// lobe averages over (1.5 lines for Hann's) is not told apart by any interval.
     #[must_use]
     pub fn density_intervals_95(&self, spectrum: &SampledSpectrum) -> Vec<Interval> {
         let (whole, half) = (variance_factors_95(self.line_dof), variance_factors_95(0.5 * self.line_dof));
@@ -105,7 +109,8 @@ impl Scatter {
     }
 }
 
-/// Shares of a line's estimate by distance in half lines: the squared transform of the taper a + b cos, which is a sinc and its neighbours.
+/// Shares of a line's estimate by distance in half lines: the squared transform of the taper a + b cos, which is a sinc and its
+/// neighbours.
 fn spread(taper: Taper) -> [f64; REACH + 1] {
     let (level, cosine) = match taper {
         Taper::Hann => (0.5, 0.5),
@@ -136,7 +141,7 @@ mod tests {
         Scatter::of(&Welch { segment_samples, taper }, samples).unwrap()
     }
 
-    /// Percival & Walden (1993), p. 294: 36 K²/(19 K − 1) for Hann's taper; Harris (1978), table I: half-overlapped segments are
+    /// Percival & Walden (1993), 6.17: 36 K²/(19 K − 1) for Hann's taper; Harris (1978), table I: half-overlapped segments are
     /// correlated by 16.7 % (Hann), 23.5 % (Hamming) and 50 % (none).
     #[test]
     fn degrees_of_freedom_are_the_published_ones() {
@@ -159,7 +164,8 @@ mod tests {
         assert_relative_eq!(scatter(512, Taper::Hann, 512_000).joint_dof(), 2000.0 * 18.0 / 19.0, max_relative = 2e-3);
     }
 
-    /// Hann's main lobe on whole lines is 1/6, 2/3, 1/6, half of all weights on half lines; what else there is adds up to the other half.
+    /// Hann's main lobe on whole lines is 1/6, 2/3, 1/6, half of all weights on half lines; what else there is adds up to the
+    /// other half.
     #[test]
     fn hanns_taper_spreads_a_line_over_its_neighbours() {
         let shares = spread(Taper::Hann);
@@ -170,7 +176,8 @@ mod tests {
         assert!(even.len() == 17 && even.iter().all(|density| (density - 2.0).abs() < 1e-12));
     }
 
-    /// White noise: Var Ŝ/S² is 2/ν, and the intervals hold the truth in 95 % of all lines. Sums over lines 20 to 100 have 81 joint ν.
+    /// White noise: Var Ŝ/S² is 2/ν, and the intervals hold the truth in 95 % of all lines. Sums over lines 20 to 100 have 81
+    /// joint ν.
     #[test]
     fn white_noise_scatters_as_stated() {
         let mut random = ChaCha8Rng::seed_from_u64(5);

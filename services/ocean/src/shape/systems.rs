@@ -1,12 +1,14 @@
 //! Wave systems of a spectrum: wind sea and swell, each with its own height and periods.
 //!
 //! 1. The estimate is smoothed over about a tenth of each frequency, so that chance makes few peaks.
-//! 2. Peaks are told apart where the valley between them is too deep for chance: neighbours are merged, the least distinct first, until all are
-//!    (after Guedes Soares 1984, *Ocean Eng.* 11, who asks for a valley under the confidence limits of the lower peak).
-//! 3. The spectrum is cut at the valleys, but the longer waves' tail goes on under the shorter ones, as one of Ochi & Hubble's (1976) with the level and the
-//!    steepness that it has before the valley: f⁻⁵ as Pierson-Moskowitz's (λ = 1), or steeper.
-//! 4. A system whose peak is higher than that of a fully grown sea of its period (Pierson and Moskowitz 1964, α = 0.0081) is wind sea, any other is
-//!    swell (Portilla, Ocampo-Torres & Monbaliu 2009, *J. Atmos. Oceanic Technol.* 26). This needs no wind, but takes a dying wind sea for swell.
+//! 2. Peaks are told apart where the valley between them is too deep for chance: neighbours are merged, the least distinct first,
+//!    until all are (after Guedes Soares 1984, *Ocean Eng.* 11, who asks for a valley under the confidence limits of the lower
+//!    peak).
+//! 3. The spectrum is cut at the valleys, but the longer waves' tail goes on under the shorter ones, as one of Ochi & Hubble's
+//!    (1976) with the level and the steepness that it has before the valley: f⁻⁵ as Pierson-Moskowitz's (λ = 1), or steeper.
+//! 4. A system whose peak is higher than that of a fully grown sea of its period (Pierson and Moskowitz 1964, α = 0.0081) is wind
+//!    sea, any other is swell (Portilla, Ocampo-Torres & Monbaliu 2009, *J. Atmos. Oceanic Technol.* 26). This needs no wind, but
+//!    takes a dying wind sea for swell.
 
 use super::peak::PeakPeriods;
 use super::scatter::Scatter;
@@ -15,14 +17,17 @@ use crate::welch::{SampledSpectrum, SpectralStatistics};
 
 /// Half width of each of two running means, as a share of the frequency.
 const SMOOTH: f64 = 0.05;
-/// Standard deviations of ln(peak/valley) that are no chance. Of some twenty independent frequencies the extremes are 1.9 deviations off to either side.
+/// Standard deviations of ln(peak/valley) that are no chance. Of some twenty independent frequencies the extremes are 1.9
+/// deviations off to either side.
 const DISTINCT_SIGMAS: f64 = 4.0;
 /// A valley that is not this much lower than its peak separates nothing, however well it is known.
 const DISTINCT_RATIO: f64 = 1.1;
+/// Peaks under this share of the highest are nothing.
+const PEAK_MIN: f64 = 1e-9;
 /// Phillips's constant of Pierson and Moskowitz's fully grown sea.
 const ALPHA: f64 = 0.0081;
-/// Where the tail's steepness and level are taken: from a share of the valley's frequency, and not nearer to the peak than a factor. JONSWAP's
-/// enhancement, which falls off steeply, reaches to 1.3 times the peak's frequency.
+/// Where the tail's steepness and level are taken: from a share of the valley's frequency, and not nearer to the peak than a
+/// factor. JONSWAP's enhancement, which falls off steeply, reaches to 1.3 times the peak's frequency.
 const STEEPNESS_FROM: (f64, f64) = (0.6, 1.3);
 const LEVEL_FROM: (f64, f64) = (0.8, 1.15);
 /// To this share of the valley's frequency.
@@ -58,8 +63,8 @@ pub struct System {
     pub peak: PeakPeriods,
 }
 
-/// The systems of `spectrum` within `low_hz`…`high_hz`, the longest waves first; none where there is no energy. Leave noise and drift outside the band, or
-/// take the noise off before.
+/// The systems of `spectrum` within `low_hz`…`high_hz`, the longest waves first; none where there is no energy. Leave noise and
+/// drift outside the band, or take the noise off before.
 #[must_use]
 pub fn systems(spectrum: &SampledSpectrum, scatter: &Scatter, (low_hz, high_hz): (f64, f64)) -> Vec<System> {
     let df_hz = spectrum.df_hz();
@@ -93,7 +98,7 @@ pub fn systems(spectrum: &SampledSpectrum, scatter: &Scatter, (low_hz, high_hz):
         }
         let at_hz = |i: usize| (from + i) as f64 * df_hz;
         let between_hz = (at_hz(begin), at_hz(valley.unwrap_or(count - 1)));
-        found.extend(system(spectrum, own, smooth.density[*peak], at_hz(*peak), between_hz));
+        found.extend(system(spectrum, &own, smooth.density[*peak], at_hz(*peak), between_hz));
     }
     found
 }
@@ -109,7 +114,7 @@ pub fn together(systems: &[System], kind: Kind) -> Option<SpectralStatistics> {
     all.statistics(0.0, f64::INFINITY)
 }
 
-fn system(whole: &SampledSpectrum, own: Vec<f64>, peak: f64, peak_hz: f64, between_hz: (f64, f64)) -> Option<System> {
+fn system(whole: &SampledSpectrum, own: &[f64], peak: f64, peak_hz: f64, between_hz: (f64, f64)) -> Option<System> {
     let spectrum = whole.map(|line, _| own.get(line).copied().unwrap_or(0.0));
     let statistics = spectrum.statistics(0.0, f64::INFINITY)?;
     let periods = PeakPeriods::of(&spectrum, between_hz)?;
@@ -200,9 +205,11 @@ impl Smooth {
     /// Peaks with valleys between them that are no chance.
     fn distinct_peaks(&self) -> Vec<usize> {
         let d = &self.density;
+        // Running sums leave rounding errors of the highest where nothing is.
+        let least = PEAK_MIN * d.iter().copied().fold(0.0, f64::max);
         let rises = |i: usize| i == 0 || d[i] > d[i - 1];
         let falls = |i: usize| d.get(i + 1).is_none_or(|next| d[i] >= *next);
-        let mut peaks: Vec<usize> = (0..d.len()).filter(|i| d[*i] > 0.0 && rises(*i) && falls(*i)).collect();
+        let mut peaks: Vec<usize> = (0..d.len()).filter(|i| d[*i] > least && rises(*i) && falls(*i)).collect();
         loop {
             let depths = peaks.windows(2).map(|pair| self.depth(pair[0], pair[1]));
             let Some((place, depth)) = depths.enumerate().min_by(|a, b| a.1.total_cmp(&b.1)) else { return peaks };

@@ -28,8 +28,8 @@ fn an_exact_density_comes_back() {
     assert_relative_eq!(found.sea.t_p_s(), 8.3, max_relative = 1e-3);
 }
 
-/// Of a known shape and period only the level is sought: ln H has the variance ¼ × 2/(ν n) with n lines of ν degrees of freedom. Other
-/// parameters can only add to that.
+/// Of a known shape and period only the level is sought: ln H has the variance ¼ × 2/(ν n) with n lines of ν degrees of freedom.
+/// Other parameters can only add to that.
 #[test]
 fn a_height_is_known_no_better_than_its_lines() {
     let (scatter, truth) = (Scatter::independent(12.0).unwrap(), PiersonMoskowitz::new(1.0, 10.0).unwrap());
@@ -41,8 +41,8 @@ fn a_height_is_known_no_better_than_its_lines() {
     assert!(factor > level_alone && factor.ln() < 3.0 * level_alone.ln(), "{factor} {level_alone}");
 }
 
-/// Half-hour records at 2 Hz of Gaussian seas, in segments of 200 s: intervals hold the truth in 95 ± 3 % of 600, fits have no bias to speak of
-/// and agree with their estimates as they say.
+/// Half-hour records at 2 Hz of Gaussian seas, in segments of 200 s: intervals hold the truth in 95 ± 3 % of 600, fits have no
+/// bias to speak of and agree with their estimates as they say.
 #[test]
 fn intervals_hold_the_truth_as_often_as_they_say() {
     let truth = Jonswap::new(2.0, 10.0, 3.3).unwrap();

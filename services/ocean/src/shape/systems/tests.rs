@@ -91,7 +91,8 @@ fn one_sea_is_one() {
     }
 }
 
-/// Half-hours at 2 Hz: of 300 single seas no more than three are split, and of 100 mixed ones all are, into parts whose mean is the truth.
+/// Half-hours at 2 Hz: of 300 single seas no more than three are split, and of 100 mixed ones all are, into parts whose mean is
+/// the truth.
 #[test]
 fn records_are_split_where_there_are_two_seas_and_only_there() {
     let (rate_hz, samples) = (2.0, 3600);
