@@ -57,25 +57,25 @@ impl WaveIntervals {
         order.sort_by(|a, b| waves[*b].height_m().total_cmp(&waves[*a].height_m()));
         let mut rank = vec![0; n];
         order.iter().enumerate().for_each(|(place, wave)| rank[*wave] = place);
+        // Groups run on from the last wave to the first: every wave is drawn as often.
+        rank.extend_from_within(..group);
         let sorted: Vec<(f64, f64)> = order.iter().map(|wave| (waves[*wave].height_m(), waves[*wave].period_s)).collect();
 
         let mut random = Random(0x9e37_79b9_7f4a_7c15);
         let mut draws: [Vec<f64>; 6] = Default::default();
         let mut times = vec![0_u32; n];
+        let counts = [part(n, 10.0), part(n, 3.0), n];
         for _ in 0..DRAWS {
             times.fill(0);
             let mut drawn = 0;
             while drawn < n {
-                // Groups run on from the last wave to the first: every wave is drawn as often.
                 let start = random.below(n);
-                for step in 0..group.min(n - drawn) {
-                    times[rank[(start + step) % n]] += 1;
+                for place in &rank[start..start + group.min(n - drawn)] {
+                    times[*place] += 1;
                 }
                 drawn += group;
             }
-            let all = share(&sorted, &times, n);
-            let third = share(&sorted, &times, part(n, 3.0));
-            let tenth = share(&sorted, &times, part(n, 10.0));
+            let [tenth, third, all] = shares(&sorted, &times, counts);
             let values = [all.height_m, all.square_m2.sqrt(), third.height_m, tenth.height_m, all.period_s, third.period_s];
             draws.iter_mut().zip(values).for_each(|(draws, value)| draws.push(value));
         }
@@ -113,29 +113,43 @@ fn part(n: usize, share: f64) -> usize {
     ((n as f64 / share).round() as usize).clamp(1, n)
 }
 
-/// Means over some waves.
+/// Means over some waves, or sums.
+#[derive(Clone, Copy)]
 struct Means {
     height_m: f64,
     square_m2: f64,
     period_s: f64,
 }
 
-/// Over the `count` highest of a redrawn record.
-fn share(sorted: &[(f64, f64)], times: &[u32], count: usize) -> Means {
-    let (mut left, mut height_m, mut square_m2, mut period_s) = (count, 0.0, 0.0, 0.0);
-    for ((height, period), times) in sorted.iter().zip(times) {
-        let taken = (*times as usize).min(left);
-        let weight = taken as f64;
-        height_m += weight * height;
-        square_m2 += weight * height * height;
-        period_s += weight * period;
-        left -= taken;
-        if left == 0 {
-            break;
-        }
+impl Means {
+    fn add(&mut self, (height_m, period_s): (f64, f64), weight: f64) {
+        self.height_m += weight * height_m;
+        self.square_m2 += weight * height_m * height_m;
+        self.period_s += weight * period_s;
     }
-    let count = count as f64;
-    Means { height_m: height_m / count, square_m2: square_m2 / count, period_s: period_s / count }
+}
+
+/// Over the highest so many of a redrawn record, for rising `counts` of which the last is all: in one pass, adding up in the order of the heights.
+fn shares(sorted: &[(f64, f64)], times: &[u32], counts: [usize; 3]) -> [Means; 3] {
+    let mut waves = sorted.iter().zip(times);
+    let (mut before, mut sum) = (0, Means { height_m: 0.0, square_m2: 0.0, period_s: 0.0 });
+    // A wave drawn several times may be the last of one share and go on in the next.
+    let mut next = waves.next();
+    counts.map(|count| {
+        while let Some((wave, &times)) = next
+            && before + times as usize <= count
+        {
+            sum.add(*wave, f64::from(times));
+            before += times as usize;
+            next = waves.next();
+        }
+        let mut means = sum;
+        if let Some((wave, _)) = next {
+            means.add(*wave, (count - before) as f64);
+        }
+        let count = count as f64;
+        Means { height_m: means.height_m / count, square_m2: means.square_m2 / count, period_s: means.period_s / count }
+    })
 }
 
 /// A generator (Marsaglia's xorshift) that needs no crate and gives the same everywhere: nothing hangs on its quality.

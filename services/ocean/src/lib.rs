@@ -16,6 +16,7 @@
 //! | [`crests`] | crest and height distributions, the highest wave in time and in space |
 //! | [`forecast`] | the sea some seconds ahead at a spot, with its errors, and its quiet moments |
 //! | [`space`] | length, direction and spread of waves from a film of the surface |
+//! | [`shape`] | what a spectrum says beyond moments: its scatter, peak, noise, wave systems, fits of JONSWAP and Pierson-Moskowitz |
 //! | [`filter`], [`spline`] | splitting a record by frequency; uneven samples to even ones |
 //!
 //! Elevation is positive up, metres; densities are one-sided, m²/Hz.
@@ -35,6 +36,7 @@ pub mod outlier;
 pub mod quality;
 pub mod record;
 pub mod space;
+pub mod shape;
 mod special;
 pub mod spectrum;
 pub mod spline;
@@ -47,4 +49,4 @@ pub use record::{Record, RecordError};
 pub use spectrum::{Jonswap, PiersonMoskowitz, Spectrum, SpectrumError};
 pub use spline::Spline;
 pub use spreading::CosTwoS;
-pub use welch::{SampledSpectrum, SpectralStatistics, Taper, Welch};
+pub use welch::{SampledError, SampledSpectrum, SpectralStatistics, Taper, Welch};

@@ -104,6 +104,28 @@ impl Jonswap {
     pub fn gamma(&self) -> f64 {
         self.gamma
     }
+
+    /// ∂ ln S/∂ ln T_p at `f_hz` > 0, H_m0 and γ kept.
+    pub(crate) fn log_slope_by_period(&self, f_hz: f64) -> f64 {
+        let nu = f_hz * self.t_p_s;
+        // Where no density is left, any finite slope will do.
+        if nu < NU_MIN {
+            return 0.0;
+        }
+        let peak = self.gamma.ln() * enhancement_exponent(nu) * (nu - 1.0) * nu / width(nu).powi(2);
+        -4.0 + 5.0 * nu.powi(-4) - peak
+    }
+
+    /// What ln γ is multiplied by in ln S at `f_hz`.
+    pub(crate) fn enhancement_exponent(&self, f_hz: f64) -> f64 {
+        enhancement_exponent(f_hz * self.t_p_s)
+    }
+
+    /// Mean of [`Self::enhancement_exponent`] over the variance: ∂ ln m0/∂ ln γ at a constant height of the shape.
+    pub(crate) fn enhancement_mean(&self) -> f64 {
+        let moment = |nu: f64| base_shape(nu) * enhancement(nu, self.gamma) * enhancement_exponent(nu);
+        (simpson(0.3, 1.0, moment) + simpson(1.0, 2.0, moment)) * self.scale / (self.h_m0_m * self.h_m0_m / 16.0 * self.t_p_s)
+    }
 }
 
 impl Spectrum for Jonswap {
@@ -117,15 +139,26 @@ impl Spectrum for Jonswap {
     }
 }
 
+/// No density is left under this share of the peak's frequency.
+const NU_MIN: f64 = 0.05;
+
 /// ν⁻⁵ exp(−5/4 ν⁻⁴) with ν = f/f_p: the Pierson-Moskowitz shape.
 fn base_shape(nu: f64) -> f64 {
     // Nothing is left below a fifth of the peak, and ν⁻⁵ would overflow further down: 0 × ∞ is not 0.
-    if nu < 0.05 { 0.0 } else { nu.powi(-5) * (-1.25 * nu.powi(-4)).exp() }
+    if nu < NU_MIN { 0.0 } else { nu.powi(-5) * (-1.25 * nu.powi(-4)).exp() }
 }
 
 fn enhancement(nu: f64, gamma: f64) -> f64 {
-    let sigma = if nu <= 1.0 { 0.07 } else { 0.09 };
-    gamma.powf((-0.5 * ((nu - 1.0) / sigma).powi(2)).exp())
+    gamma.powf(enhancement_exponent(nu))
+}
+
+fn enhancement_exponent(nu: f64) -> f64 {
+    (-0.5 * ((nu - 1.0) / width(nu)).powi(2)).exp()
+}
+
+/// σ of JONSWAP.
+fn width(nu: f64) -> f64 {
+    if nu <= 1.0 { 0.07 } else { 0.09 }
 }
 
 /// The two-parameter Pierson-Moskowitz (Bretschneider, ISSC) spectrum of a fully grown sea:
@@ -214,6 +247,44 @@ mod tests {
         let m = |n| young.moment(n, 0.005, 1000.0);
         assert_relative_eq!(m(0) / m(1) / 10.0, 0.834, max_relative = 2e-3);
         assert_relative_eq!((m(0) / m(2)).sqrt() / 10.0, 0.779, max_relative = 3e-3);
+    }
+
+    /// All moments of Pierson-Moskowitz in closed form: mₙ = m0 (5/4)^(n/4) Γ(1 − n/4) f_pⁿ, for n < 4. Gammas of Abramowitz & Stegun,
+    /// tables 6.1: Γ(3/2), Γ(5/4), Γ(3/4), Γ(1/2), Γ(1/4).
+    #[test]
+    fn moments_of_pierson_moskowitz_are_gamma_functions() {
+        let (h_m0_m, t_p_s) = (0.6_f64, 3.7_f64);
+        let grown = PiersonMoskowitz::new(h_m0_m, t_p_s).unwrap();
+        let gammas = [
+            (-2, 0.886_226_925_452_758),
+            (-1, 0.906_402_477_055_477),
+            (0, 1.0),
+            (1, 1.225_416_702_465_178),
+            (2, 1.772_453_850_905_516),
+            (3, 3.625_609_908_221_908),
+        ];
+        for (order, gamma) in gammas {
+            let expected = h_m0_m * h_m0_m / 16.0 * 1.25_f64.powf(0.25 * f64::from(order)) * gamma * t_p_s.powi(-order);
+            // The tail that the upper end cuts off m3 is 5/4 × 4 f_p/f of it.
+            assert_relative_eq!(grown.moment(order, 0.05 / t_p_s, 1e6 / t_p_s), expected, max_relative = 1e-5);
+        }
+    }
+
+    /// Derivatives by hand against differences of the density itself.
+    #[test]
+    fn slopes_by_period_and_enhancement_are_differences() {
+        let step = 1e-6_f64;
+        for gamma in [1.5, 3.3, 9.0] {
+            let at = |t_p_s: f64, gamma: f64, f_hz: f64| Jonswap::new(0.8, t_p_s, gamma).unwrap().density_m2_per_hz(f_hz).ln();
+            let sea = Jonswap::new(0.8, 5.0, gamma).unwrap();
+            for f_hz in [0.12, 0.17, 0.19, 0.21, 0.25, 0.6] {
+                let by_period = (at(5.0 * step.exp(), gamma, f_hz) - at(5.0 * (-step).exp(), gamma, f_hz)) / (2.0 * step);
+                assert_relative_eq!(sea.log_slope_by_period(f_hz), by_period, max_relative = 1e-5, epsilon = 1e-6);
+                let by_gamma = (at(5.0, gamma * step.exp(), f_hz) - at(5.0, gamma * (-step).exp(), f_hz)) / (2.0 * step);
+                let slope = sea.enhancement_exponent(f_hz) - sea.enhancement_mean();
+                assert_relative_eq!(slope, by_gamma, max_relative = 1e-5, epsilon = 1e-6);
+            }
+        }
     }
 
     #[test]

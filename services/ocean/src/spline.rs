@@ -46,12 +46,19 @@ impl Spline {
         // The tridiagonal system for the second derivatives (Thomas's algorithm), zero at both ends.
         let mut curvature = vec![0.0; n];
         let mut upper = vec![0.0; n];
+        // The step to each knot is the one from the last: worked out once.
+        let step = |i: usize| {
+            let width = knots[i + 1] - knots[i];
+            (width, (values[i + 1] - values[i]) / width)
+        };
+        let (mut before, mut slope_before) = step(0);
         for i in 1..n - 1 {
-            let (before, after) = (knots[i] - knots[i - 1], knots[i + 1] - knots[i]);
-            let bend = 6.0 * ((values[i + 1] - values[i]) / after - (values[i] - values[i - 1]) / before);
+            let (after, slope_after) = step(i);
+            let bend = 6.0 * (slope_after - slope_before);
             let pivot = 2.0 * (before + after) - before * upper[i - 1];
             upper[i] = after / pivot;
             curvature[i] = (bend - before * curvature[i - 1]) / pivot;
+            (before, slope_before) = (after, slope_after);
         }
         for i in (1..n - 1).rev() {
             curvature[i] -= upper[i] * curvature[i + 1];

@@ -97,12 +97,44 @@ pub struct SampledSpectrum {
     density_m2_per_hz: Vec<f64>,
 }
 
+/// Why densities are no spectrum.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum SampledError {
+    /// The distance between frequencies.
+    #[error("frequencies must be a finite distance above 0 Hz apart, not {0} Hz")]
+    Step(f64),
+    /// No frequency above zero.
+    #[error("a spectrum needs at least 2 densities, not {0}")]
+    TooShort(usize),
+    /// Negative, NaN, or so large that its fourth power would overflow.
+    #[error("density {index} of the spectrum is {value} m²/Hz")]
+    Density {
+        /// The first such density.
+        index: usize,
+        /// It, m²/Hz.
+        value: f64,
+    },
+}
+
 impl SampledSpectrum {
-    /// From densities at 0, `df_hz`, 2 `df_hz`, …, m²/Hz; `None` unless `df_hz` is positive and every density finite and not negative.
-    #[must_use]
-    pub fn new(df_hz: f64, density_m2_per_hz: Vec<f64>) -> Option<Self> {
-        let valid = df_hz > 0.0 && df_hz.is_finite() && density_m2_per_hz.iter().all(|density| (0.0..f64::MAX).contains(density));
-        valid.then_some(Self { df_hz, density_m2_per_hz })
+    /// One-sided densities (m²/Hz) at 0, `df_hz`, 2 `df_hz`, …, as from a buoy's file or a theory.
+    ///
+    /// # Errors
+    /// [`SampledError`] for a distance that is not positive, fewer than two densities, or a density that is negative or not finite.
+    pub fn new(df_hz: f64, density_m2_per_hz: impl Into<Vec<f64>>) -> Result<Self, SampledError> {
+        const DENSITY_MAX: f64 = 1e60;
+        let density_m2_per_hz = density_m2_per_hz.into();
+        if !(df_hz > 0.0 && df_hz.is_finite()) {
+            return Err(SampledError::Step(df_hz));
+        }
+        if density_m2_per_hz.len() < 2 {
+            return Err(SampledError::TooShort(density_m2_per_hz.len()));
+        }
+        let good = |density: f64| (0.0..=DENSITY_MAX).contains(&density);
+        if let Some((index, &value)) = density_m2_per_hz.iter().enumerate().find(|(_, density)| !good(**density)) {
+            return Err(SampledError::Density { index, value });
+        }
+        Ok(Self { df_hz, density_m2_per_hz })
     }
 
     /// Distance between two frequencies, hertz.
@@ -117,8 +149,14 @@ impl SampledSpectrum {
         &self.density_m2_per_hz
     }
 
+    /// The same frequencies with other densities, by line and density.
+    pub(crate) fn map(&self, of: impl Fn(usize, f64) -> f64) -> Self {
+        let density_m2_per_hz = self.density_m2_per_hz.iter().enumerate().map(|(line, density)| of(line, *density)).collect();
+        Self { df_hz: self.df_hz, density_m2_per_hz }
+    }
+
     /// Frequencies within `low_hz`…`high_hz` and above zero, with their densities.
-    fn band(&self, low_hz: f64, high_hz: f64) -> impl Iterator<Item = (f64, f64)> {
+    pub(crate) fn band(&self, low_hz: f64, high_hz: f64) -> impl Iterator<Item = (f64, f64)> + Clone {
         let df_hz = self.df_hz;
         self.density_m2_per_hz
             .iter()
@@ -265,6 +303,18 @@ mod tests {
         assert!(
             flat.peakedness(0.9, 1.0).is_nan() && flat.width_nu(0.9, 1.0).is_nan() && flat.width_epsilon(0.9, 1.0).is_nan()
         );
+    }
+
+    #[test]
+    fn what_is_no_spectrum_is_refused_by_name() {
+        for df_hz in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(matches!(SampledSpectrum::new(df_hz, vec![1.0; 9]), Err(SampledError::Step(_))));
+        }
+        assert_eq!(SampledSpectrum::new(0.1, vec![1.0]), Err(SampledError::TooShort(1)));
+        for bad in [-1e-9, f64::NAN, f64::INFINITY, 1e99] {
+            assert!(matches!(SampledSpectrum::new(0.1, vec![0.0, bad]), Err(SampledError::Density { index: 1, .. })));
+        }
+        assert_eq!(SampledSpectrum::new(0.1, vec![0.0, 2.0]).unwrap().moment(1, 0.0, 1.0), 0.1 * 2.0 * 0.1);
     }
 
     #[test]

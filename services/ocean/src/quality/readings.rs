@@ -106,15 +106,22 @@ fn reject(series: &mut Ordered, places: &[usize]) -> Vec<usize> {
 /// Test 9: readings missing in a row, whether left out or without an elevation. Names the readings before and after each gap.
 #[must_use]
 pub fn gap(series: &Ordered, limits: &ReadingLimits) -> Finding {
-    let present: Vec<&Reading> = good(series).collect();
-    if present.is_empty() {
-        return nothing(Test::Gap);
-    }
-    let missing = |pair: &[&Reading]| ((pair[1].stamp_s - pair[0].stamp_s) / series.interval_s).round() - 1.0;
+    let mut present = good(series);
+    let Some(mut before) = present.next() else { return nothing(Test::Gap) };
     let suspect = limits.gap_suspect_samples as f64;
-    let longest = present.windows(2).map(missing).fold(0.0, f64::max);
-    let around: Vec<usize> =
-        present.windows(2).filter(|w| missing(w) >= suspect).flat_map(|w| [w[0].index, w[1].index]).collect();
+    let (mut longest, mut around) = (0.0_f64, Vec::new());
+    for after in present {
+        let steps = (after.stamp_s - before.stamp_s) / series.interval_s;
+        // Rounding is slow; nearly all steps are one interval.
+        if steps >= 1.5 || suspect < 1.0 {
+            let missing = steps.round() - 1.0;
+            longest = longest.max(missing);
+            if missing >= suspect {
+                around.extend([before.index, after.index]);
+            }
+        }
+        before = after;
+    }
     let reason =
         format!("at most {longest:.0} readings missing in a row, in {} gaps of {suspect:.0} or more", around.len() / 2);
     Finding::new(Test::Gap, Flag::rising(longest, suspect, limits.gap_fail_samples as f64), reason).about(around)
@@ -128,18 +135,17 @@ pub fn range(series: &mut Ordered, limits: &ReadingLimits) -> Finding {
     }
     let middle = values_m.len() / 2;
     let median_m = *values_m.select_nth_unstable_by(middle, f64::total_cmp).1;
-    let places = |inside: &dyn Fn(f64) -> bool, series: &Ordered| -> Vec<usize> {
-        (0..series.readings.len())
-            .filter(|i| series.readings[*i].is_good() && !inside(series.readings[*i].elevation_m))
-            .collect()
-    };
-    let impossible = places(&|x| limits.instrument_m.contains(&x), series);
+    fn outside(series: &Ordered, inside: impl Fn(f64) -> bool) -> Vec<usize> {
+        let of = |(place, reading): (usize, &Reading)| (reading.is_good() && !inside(reading.elevation_m)).then_some(place);
+        series.readings.iter().enumerate().filter_map(of).collect()
+    }
+    let impossible = outside(series, |x| limits.instrument_m.contains(&x));
     let rejected = reject(series, &impossible);
     if !rejected.is_empty() {
         let reason = format!("{} readings outside {:?} m, what the instrument can give", rejected.len(), limits.instrument_m);
         return Finding::new(Test::Range, Flag::Fail, reason).about(rejected);
     }
-    let unlikely = places(&|x| limits.local_m.contains(&(x - median_m)), series);
+    let unlikely = outside(series, |x| limits.local_m.contains(&(x - median_m)));
     let indices: Vec<usize> = unlikely.iter().map(|i| series.readings[*i].index).collect();
     let flag = if indices.is_empty() { Flag::Pass } else { Flag::Suspect };
     let reason = format!("{} readings outside {:?} m about the median of {median_m:.3} m", indices.len(), limits.local_m);
@@ -199,18 +205,18 @@ pub fn spike(series: &mut Ordered, limits: &ReadingLimits) -> Finding {
 pub fn segment_shift(series: &Ordered, limits: &ReadingLimits) -> Finding {
     const READINGS_MIN: usize = 8;
     let Some(start_s) = good(series).next().map(|r| r.stamp_s) else { return nothing(Test::SegmentShift) };
-    let present: Vec<&Reading> = good(series).collect();
-    let end_s = present.last().map_or(start_s, |r| r.stamp_s) + series.interval_s;
+    let segment = |r: &Reading| ((r.stamp_s - start_s) / limits.shift_segment_s).floor();
+    let present: Vec<(f64, &Reading)> = good(series).map(|r| (segment(r), r)).collect();
+    let end_s = present.last().map_or(start_s, |(_, r)| r.stamp_s) + series.interval_s;
     // Only whole segments: part of a wave has a mean of its own.
     let whole = ((end_s - start_s) / limits.shift_segment_s + 1e-6).floor();
-    let segment = |r: &Reading| ((r.stamp_s - start_s) / limits.shift_segment_s).floor();
     let means: Vec<(f64, f64, usize)> = present
-        .chunk_by(|a, b| segment(a) == segment(b))
-        .filter(|readings| readings.len() >= READINGS_MIN && segment(readings[0]) < whole)
+        .chunk_by(|a, b| a.0 == b.0)
+        .filter(|readings| readings.len() >= READINGS_MIN && readings[0].0 < whole)
         .map(|readings| {
-            let mean_m = readings.iter().map(|r| r.elevation_m).sum::<f64>() / readings.len() as f64;
-            let square_m2 = readings.iter().map(|r| (r.elevation_m - mean_m).powi(2)).sum::<f64>() / readings.len() as f64;
-            (mean_m, square_m2, readings[0].index)
+            let mean_m = readings.iter().map(|(_, r)| r.elevation_m).sum::<f64>() / readings.len() as f64;
+            let square_m2 = readings.iter().map(|(_, r)| (r.elevation_m - mean_m).powi(2)).sum::<f64>() / readings.len() as f64;
+            (mean_m, square_m2, readings[0].1.index)
         })
         .collect();
     if means.len() < 2 {

@@ -48,7 +48,7 @@ impl Spectral {
         // White noise of variance σ² has 2 σ²/rate everywhere.
         let floor = 2.0 * series.noise_m2 * interval_s;
         density.iter_mut().for_each(|x| *x = (*x / worth - floor).max(0.0));
-        let pooled = SampledSpectrum::new(df_hz, density.clone())?;
+        let pooled = SampledSpectrum::new(df_hz, density.clone()).ok()?;
         let band = (wave_hz_min.max(0.5 * df_hz), 0.5 / interval_s);
         let found = pooled.statistics(band.0, band.1)?;
         // Gauges see the same waves: the freedom claimed is that of the longest record alone.
