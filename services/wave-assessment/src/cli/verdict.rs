@@ -89,6 +89,7 @@ fn statistics(burst: &Burst) -> Option<Statistics> {
         h_m0_m,
         h_rms_m: estimate(up.h_rms_m, up.h_rms_m_low, up.h_rms_m_high),
         h_tenth_m: estimate(up.h_tenth_m, up.h_tenth_m_low, up.h_tenth_m_high),
+        freedom: 1.0,
         spectral: None,
         t_z_s: Some(estimate(up.t_z_s, up.t_z_s_low, up.t_z_s_high)),
         slope_rms_rad: Some(Estimate { value: slope, low: share(h_m0_m.low), high: share(h_m0_m.high) }),

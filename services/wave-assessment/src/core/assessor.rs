@@ -2,6 +2,9 @@
 
 use halcyon_model::{IdError, LocalPoint, RigId, SeaState, Stamp, SurfacePatch, Verdict, VerdictReason, VerdictState};
 
+use super::ahead::calm;
+use super::direction::Direction;
+use super::film::film;
 use super::hidden::{Hidden, hidden};
 use super::patch::{self, PatchError};
 use super::quality;
@@ -22,7 +25,12 @@ pub struct Assessor {
     /// When the last sea state was issued, whatever it rested on.
     issued: Option<Stamp>,
     verdict: VerdictState,
+    /// What was last found of directions, by patch time: they change slowly, and take a film to find.
+    direction: Option<(Stamp, Option<Direction>)>,
 }
+
+/// Directions are looked for once in so many seconds of patch time.
+const DIRECTION_PERIOD_S: f64 = 5.0;
 
 impl Assessor {
     /// An assessor that has seen nothing.
@@ -32,7 +40,7 @@ impl Assessor {
     pub fn new(config: Config) -> Result<Self, IdError> {
         let rig = RigId::new(&config.rig)?;
         let verdict = VerdictState::Inconclusive;
-        Ok(Self { config, rig, window: Window::default(), assessed: None, issued: None, verdict })
+        Ok(Self { config, rig, window: Window::default(), assessed: None, issued: None, verdict, direction: None })
     }
 
     /// Takes in one patch, at its place in time if it comes late or out of order. A sea state comes out once in `period_s` of patch time.
@@ -111,6 +119,22 @@ impl Assessor {
         self.assessed = None;
         self.issued = None;
         self.verdict = VerdictState::Inconclusive;
+        self.direction = None;
+    }
+
+    /// Looks for directions if it is time. Without waves above the noise there are none.
+    fn look_around(&mut self, newest: Stamp, interval_s: Option<f64>, statistics: Option<&Statistics>) {
+        let recent = self.direction.as_ref().is_some_and(|(at, _)| (0.0..DIRECTION_PERIOD_S).contains(&newest.seconds_since(*at)));
+        if recent {
+            return;
+        }
+        let found = || {
+            let (statistics, interval_s) = (statistics?, interval_s?);
+            // Fewer seconds have no segment of a spectrum.
+            let (film, _) = film(&self.window, interval_s)?;
+            Direction::of(&film, statistics.t_z_s?.value, statistics.freedom)
+        };
+        self.direction = Some((newest, found()));
     }
 
     fn assess(&mut self, now: Stamp) -> Option<SeaState> {
@@ -143,6 +167,7 @@ impl Assessor {
             },
             statistics,
         };
+        self.look_around(newest, interval_s, evidence.statistics.as_ref());
         let judgement = judge(&evidence, &self.config, self.verdict);
         self.verdict = judgement.state;
         Some(self.report(now, newest, position, series.as_ref(), Some(&evidence), judgement))
@@ -160,6 +185,8 @@ impl Assessor {
     ) -> SeaState {
         let statistics = evidence.and_then(|evidence| evidence.statistics.as_ref());
         let spectral = statistics.and_then(|s| s.spectral.as_ref());
+        let direction = self.direction.as_ref().and_then(|(_, found)| found.as_ref()).filter(|_| statistics.is_some());
+        let calm = spectral.zip(direction).and_then(|(s, d)| calm(&self.window, s, d, position, &self.config));
         let Judgement { state, reasons, probability } = judgement;
         let frames = self.window.frames();
         let (start, end) = (frames.front().map_or(measured, |f| f.stamp), frames.back().map_or(measured, |f| f.stamp));
@@ -185,10 +212,10 @@ impl Assessor {
             t_m02_s: spectral.map(|s| s.t_m02_s),
             t_e_s: spectral.map(|s| s.t_e_s),
             vertical_speed_rms_mps: statistics.map(Statistics::vertical_speed_rms_mps),
-            directional: None,
+            directional: direction.map(|d| d.directional),
             spectrum: spectral.map(|s| s.spectrum.clone()),
             quality: evidence.map_or_else(Vec::new, |e| e.quality.clone()),
-            calm: None,
+            calm,
             trace: series.map_or_else(Vec::new, Series::trace),
             verdict: Verdict { state, probability, reasons, valid_until: measured.plus_secs_f64(self.config.validity_s) },
         }

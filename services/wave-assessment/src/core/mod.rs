@@ -6,11 +6,15 @@
 //! | frame | what is kept of one patch: the gauges' readings, slope, level, coverage |
 //! | window | the frames of the last while over the same spot |
 //! | series | one gauge's elevation over the window, broken where patches are missing |
+//! | film | the window's grids over one piece of water, for directions |
 //! | hidden part | waves longer than the footprint: a patch's own mean level takes them out of its grid |
 //!
 //! Nothing here knows the bus, the disk or a clock: `now` is an argument.
 
+mod ahead;
 mod assessor;
+mod direction;
+mod film;
 mod gauge;
 mod hidden;
 mod patch;

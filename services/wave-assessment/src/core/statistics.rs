@@ -52,6 +52,8 @@ pub(crate) struct Statistics {
     pub h_tenth_m: Estimate,
     pub t_z_s: Option<Estimate>,
     pub slope_rms_rad: Option<Estimate>,
+    /// Degrees of freedom of the variance.
+    pub freedom: f64,
     /// `None` where there are too few samples, or no waves above the noise.
     pub spectral: Option<Spectral>,
 }
@@ -111,6 +113,7 @@ impl Statistics {
             t_z_s,
             spectral: if above_noise { Spectral::of(series, interval_s, wave_hz_min) } else { None },
             slope_rms_rad: slope(window, freedom),
+            freedom,
         })
     }
 

@@ -5,6 +5,7 @@ use std::hash::{Hash, Hasher};
 
 use halcyon_model::{ElevationGrid, LocalPoint, Stamp, SurfacePatch};
 
+use super::film::Raster;
 use super::gauge::{GAUGES, Gauges, Reading};
 use super::hidden::Bend;
 use super::patch::cell;
@@ -40,6 +41,8 @@ pub(crate) struct Frame {
     pub level_sigma_m: Option<f64>,
     /// Distance from the camera to the mean plane, metres.
     pub distance_m: f64,
+    /// The grid, coarsely, for directions.
+    pub raster: Raster,
     /// Whether the grid is, bit for bit, the one before: a source that repeats itself measures nothing.
     pub frozen: bool,
 }
@@ -73,6 +76,7 @@ impl Window {
             level_m: patch.level_m,
             level_sigma_m: patch.level_sigma_m,
             distance_m: patch.plane.distance_m,
+            raster: Raster::of(grid),
             frozen: fingerprint.is_some() && fingerprint == self.fingerprint,
         };
         self.fingerprint = fingerprint;
