@@ -9,7 +9,7 @@
 //! | [`water`], [`shell`] | dispersion over a current; what of a spectrum lies on it |
 //! | [`moments`], [`statistics`] | directions by frequency; wavelength, direction, spread, slopes |
 //! | [`directional`] | S(f, θ) and the plane waves it stands for |
-//! | [`gauges`], [`array`] | S(f, θ) of virtual gauges by maximum likelihood, of films shorter than their waves and without planes, too |
+//! | [`gauges`], [`mod@array`] | S(f, θ) of virtual gauges by maximum likelihood, of films shorter than their waves and without planes, too |
 //! | [`snapshot`] | what one picture tells |
 //! | [`entropy`] | S(f, θ) of first moments by maximum entropy |
 //!
