@@ -192,6 +192,11 @@ mod tests {
         assert!(axis.abs() < 3.0, "{axis}");
         let spread = mean(&|s| s.axis_spread_rad);
         let expected = (0.5 * (1.0 - 90.0 / 132.0_f64)).sqrt();
+        println!(
+            "pictures: k {k:.3} mss {mss:.5} axis {axis:.2} spread {spread:.3}, for {:.3} {:.5} 0 {expected:.3}",
+            sea.moment_k(1) / sea.moment_k(0),
+            sea.moment_k(2)
+        );
         assert!((spread / expected - 1.0).abs() < 0.1, "{spread} {expected}");
     }
 
