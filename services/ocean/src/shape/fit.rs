@@ -145,10 +145,7 @@ impl<'a> Estimate<'a> {
         let lines = self.lines()?;
         let bounds = lines.bounds();
         let start = [lines.h_m0_m.ln(), lines.t_p_s.ln()];
-        let expected = |theta: &[f64; 2]| {
-            let Expected { density, by: [height, period, _] } = self.expected(&lines, &[theta[0], theta[1], 0.0])?;
-            Some(Expected { density, by: [height, period] })
-        };
+        let expected = |theta: &[f64; 2]| self.expected(&lines, &[theta[0], theta[1], 0.0]);
         let found = climb(lines.measured, start, &[bounds[0], bounds[1]], expected).ok_or(FitError::Undetermined)?;
         let [h_m0_m, t_p_s] = found.theta.map(f64::exp);
         let sea = PiersonMoskowitz::new(h_m0_m, t_p_s)?;
@@ -191,21 +188,21 @@ impl<'a> Estimate<'a> {
         climb(lines.measured, start, &[height, period, gamma_bounds], |theta| self.expected(lines, theta))
     }
 
-    /// What is expected of each line, and its derivatives by the logarithms of H_m0, T_p and γ.
-    fn expected(&self, lines: &Lines<'_>, theta: &[f64; 3]) -> Option<Expected<3>> {
+    /// What is expected of each line, and its derivatives by the first N of the logarithms of H_m0, T_p and γ.
+    fn expected<const N: usize>(&self, lines: &Lines<'_>, theta: &[f64; 3]) -> Option<Expected<N>> {
         let [h_m0_m, t_p_s, gamma] = theta.map(f64::exp);
         let sea = Jonswap::new(h_m0_m, t_p_s, gamma.clamp(1.0, 20.0)).ok()?;
         let df_hz = self.spectrum.df_hz();
         let spread = |of: &dyn Fn(f64) -> f64| self.scatter.expected(lines.range.clone(), |line| of(line * df_hz));
         let bare = spread(&|f_hz| sea.density_m2_per_hz(f_hz));
-        let by = [
-            bare.iter().map(|density| 2.0 * density).collect(),
-            spread(&|f_hz| sea.density_m2_per_hz(f_hz) * sea.log_slope_by_period(f_hz)),
-            {
+        let by = std::array::from_fn(|i| match i {
+            0 => bare.iter().map(|density| 2.0 * density).collect(),
+            1 => spread(&|f_hz| sea.density_m2_per_hz(f_hz) * sea.log_slope_by_period(f_hz)),
+            _ => {
                 let mean = sea.enhancement_mean();
                 spread(&|f_hz| sea.density_m2_per_hz(f_hz) * (sea.enhancement_exponent(f_hz) - mean))
-            },
-        ];
+            }
+        });
         Some(Expected { density: bare.iter().map(|density| density + self.noise_m2_per_hz).collect(), by })
     }
 
