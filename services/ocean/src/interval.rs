@@ -127,29 +127,30 @@ impl Means {
         self.square_m2 += weight * height_m * height_m;
         self.period_s += weight * period_s;
     }
+
+    fn over(self, count: f64) -> Self {
+        Self { height_m: self.height_m / count, square_m2: self.square_m2 / count, period_s: self.period_s / count }
+    }
 }
 
-/// Over the highest so many of a redrawn record, for rising `counts` of which the last is all: in one pass, adding up in the order of the heights.
+/// Over the highest so many of a redrawn record, for rising `counts` of which the last is all: in one pass, adding up in the order of
+/// the heights.
 fn shares(sorted: &[(f64, f64)], times: &[u32], counts: [usize; 3]) -> [Means; 3] {
-    let mut waves = sorted.iter().zip(times);
-    let (mut before, mut sum) = (0, Means { height_m: 0.0, square_m2: 0.0, period_s: 0.0 });
-    // A wave drawn several times may be the last of one share and go on in the next.
-    let mut next = waves.next();
-    counts.map(|count| {
-        while let Some((wave, &times)) = next
-            && before + times as usize <= count
-        {
-            sum.add(*wave, f64::from(times));
-            before += times as usize;
-            next = waves.next();
+    let mut sum = Means { height_m: 0.0, square_m2: 0.0, period_s: 0.0 };
+    let (mut before, mut found, mut place) = (0, [sum; 3], 0);
+    for (wave, times) in sorted.iter().zip(times) {
+        let after = before + *times as usize;
+        // A wave drawn several times may be the last of one share and go on in the next.
+        while place < counts.len() && after >= counts[place] {
+            let mut means = sum;
+            means.add(*wave, (counts[place] - before) as f64);
+            found[place] = means.over(counts[place] as f64);
+            place += 1;
         }
-        let mut means = sum;
-        if let Some((wave, _)) = next {
-            means.add(*wave, (count - before) as f64);
-        }
-        let count = count as f64;
-        Means { height_m: means.height_m / count, square_m2: means.square_m2 / count, period_s: means.period_s / count }
-    })
+        sum.add(*wave, f64::from(*times));
+        before = after;
+    }
+    found
 }
 
 /// A generator (Marsaglia's xorshift) that needs no crate and gives the same everywhere: nothing hangs on its quality.

@@ -83,7 +83,7 @@ impl Jonswap {
         // ∫ ν⁻⁵ exp(−5/4 ν⁻⁴) dν = 1/5 in closed form; only the enhancement's excess needs quadrature, and it is confined to
         // within ten widths of the peak.
         let excess = |nu: f64| base_shape(nu) * (enhancement(nu, gamma) - 1.0);
-        let area = 0.2 + simpson(0.3, 1.0, excess) + simpson(1.0, 2.0, excess);
+        let area = if gamma > 1.0 { 0.2 + simpson(0.3, 1.0, excess) + simpson(1.0, 2.0, excess) } else { 0.2 };
         Ok(Self { h_m0_m, t_p_s, gamma, scale: h_m0_m * h_m0_m / 16.0 * t_p_s / area })
     }
 

@@ -252,11 +252,18 @@ pub fn acceleration(series: &mut Ordered, limits: &ReadingLimits) -> Finding {
     let mut largest_mps2 = 0.0_f64;
     for pass in 0..PASSES {
         let sharp = |i: usize| acceleration_mps2(&series.readings, series.interval_s, i, lag).map_or(0.0, f64::abs);
-        let values: Vec<f64> = (0..series.readings.len()).map(sharp).collect();
-        if pass == 0 {
-            largest_mps2 = values.iter().copied().fold(0.0, f64::max);
+        let mut beyond = Vec::new();
+        let mut largest = 0.0_f64;
+        for place in 0..series.readings.len() {
+            let value = sharp(place);
+            largest = largest.max(value);
+            if value > limit_mps2 {
+                beyond.push(place);
+            }
         }
-        let beyond: Vec<usize> = (0..values.len()).filter(|i| values[*i] > limit_mps2).collect();
+        if pass == 0 {
+            largest_mps2 = largest;
+        }
         if beyond.is_empty() {
             break;
         }
@@ -270,7 +277,7 @@ pub fn acceleration(series: &mut Ordered, limits: &ReadingLimits) -> Finding {
         // A spike bends its neighbours too: they are within two lags of it.
         let worst: Vec<usize> = beyond
             .chunk_by(|a, b| b - a <= lag)
-            .filter_map(|run| run.iter().copied().max_by(|a, b| values[*a].total_cmp(&values[*b])))
+            .filter_map(|run| run.iter().copied().max_by(|a, b| sharp(*a).total_cmp(&sharp(*b))))
             .collect();
         rejected.extend(reject(series, &worst));
     }

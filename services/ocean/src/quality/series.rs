@@ -151,15 +151,19 @@ impl Ordered {
     /// [`Self::SAMPLES_MAX`] samples.
     #[must_use]
     pub fn even(&self, stretch: std::ops::Range<usize>) -> Option<Even> {
-        let good: Vec<&Reading> = self.readings.get(stretch)?.iter().filter(|reading| reading.is_good()).collect();
-        let (first, last) = (good.first()?, good.last()?);
+        let good = self.readings.get(stretch)?.iter().filter(|reading| reading.is_good());
+        let (first, last) = (good.clone().next()?, good.clone().next_back()?);
         let count = ((last.stamp_s - first.stamp_s) / self.interval_s).round() + 1.0;
-        if good.len() < Record::SAMPLES_MIN || !(count >= Record::SAMPLES_MIN as f64 && count <= Self::SAMPLES_MAX as f64) {
+        if !(count >= Record::SAMPLES_MIN as f64 && count <= Self::SAMPLES_MAX as f64) {
             return None;
         }
         let count = count as usize;
         // Seconds since the epoch leave few digits for the fractions: count from the first reading.
-        let knots: Vec<f64> = good.iter().map(|reading| reading.stamp_s - first.stamp_s).collect();
+        let (knots, elevations_m): (Vec<f64>, Vec<f64>) =
+            good.map(|reading| (reading.stamp_s - first.stamp_s, reading.elevation_m)).unzip();
+        if knots.len() < Record::SAMPLES_MIN {
+            return None;
+        }
         let mut next = 0;
         let filled = (0..count)
             .map(|i| {
@@ -170,7 +174,7 @@ impl Ordered {
                 (knots[next] - t_s).abs() > 0.75 * self.interval_s
             })
             .collect();
-        let curve = Spline::new(knots, good.iter().map(|reading| reading.elevation_m).collect()).ok()?;
+        let curve = Spline::new(knots, elevations_m).ok()?;
         let record = Record::new(curve.sampled(0.0, self.interval_s, count), 1.0 / self.interval_s).ok()?;
         Some(Even { record, start_s: first.stamp_s, filled })
     }

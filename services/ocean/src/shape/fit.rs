@@ -4,13 +4,19 @@
 //! The likelihood of chi-square lines weighs each by that. What is compared with the estimate is the density as the taper spreads
 //! it, so that segments may be short.
 //!
-//! Intervals are of the logarithms of height, period and γ (all positive), normal, from the information matrix.
+//! Intervals are of the logarithms of height, period and γ (all positive), normal, from the information matrix J and the
+//! covariance V of the likelihood's slopes: J⁻¹ V J⁻¹ (White 1982). V is J where lines are independent; under a taper as wide as
+//! the peak they are not.
+
+mod found;
+
+pub use found::{FitError, Goodness, JonswapFit, PiersonMoskowitzFit};
 
 use super::likelihood::{Expected, Found, climb};
 use super::peak::PeakPeriods;
 use super::scatter::Scatter;
 use crate::interval::Interval;
-use crate::spectrum::{Jonswap, PiersonMoskowitz, Spectrum, SpectrumError};
+use crate::spectrum::{Jonswap, PiersonMoskowitz, Spectrum};
 use crate::welch::SampledSpectrum;
 
 /// Two-sided 95 % of the normal distribution.
@@ -21,74 +27,6 @@ const LINES_MIN: usize = 8;
 const FRONT: f64 = 0.6;
 /// Periods at most this factor from where the search began.
 const PERIOD_FACTOR: f64 = 3.0;
-
-/// Why there is no fit.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum FitError {
-    /// Too few lines in the band.
-    #[error("{lines} lines of the spectrum are from 0.6 of its peak on in the band, a fit needs {lines_min}")]
-    Lines {
-        /// Lines there are.
-        lines: usize,
-        /// Lines needed.
-        lines_min: usize,
-    },
-    /// No energy in the band, or densities that are not finite.
-    #[error("the band holds no energy")]
-    Still,
-    /// The noise given is negative or not finite.
-    #[error("noise must be finite and not negative, not {0} m²/Hz")]
-    Noise(f64),
-    /// The likelihood has no top, or a flat one.
-    #[error("the spectrum does not tell the parameters")]
-    Undetermined,
-}
-
-impl From<SpectrumError> for FitError {
-    fn from(_: SpectrumError) -> Self {
-        Self::Undetermined
-    }
-}
-
-/// How well a fit agrees with its estimate.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Goodness {
-    /// Mean of (ν/2)(Ŝ/E − 1)²: 1 where the estimate scatters about the fit as it should, more where the sea has another shape.
-    pub misfit: f64,
-    /// What [`Self::misfit`] is above 1, in its own standard deviations: above 3 the shape is wrong. (Neighbouring lines under
-    /// one taper resemble each other: counted as if the lines were `joint_dof`/`line_dof` as many.)
-    pub misfit_sigmas: f64,
-    /// Lines fitted.
-    pub lines: usize,
-}
-
-/// A JONSWAP spectrum fitted.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct JonswapFit {
-    /// The likeliest.
-    pub sea: Jonswap,
-    /// 95 % of H_m0, metres.
-    pub h_m0_m: Interval,
-    /// 95 % of the peak period, seconds.
-    pub t_p_s: Interval,
-    /// 95 % of γ, within its range of 1 to 20.
-    pub gamma: Interval,
-    /// Whether it is one at all.
-    pub goodness: Goodness,
-}
-
-/// A Pierson-Moskowitz spectrum fitted.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PiersonMoskowitzFit {
-    /// The likeliest.
-    pub sea: PiersonMoskowitz,
-    /// 95 % of H_m0, metres.
-    pub h_m0_m: Interval,
-    /// 95 % of the peak period, seconds.
-    pub t_p_s: Interval,
-    /// Whether it is one at all.
-    pub goodness: Goodness,
-}
 
 /// An estimate of one wave system, and what is known about it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -126,7 +64,8 @@ impl<'a> Estimate<'a> {
         let [h_m0_m, t_p_s, gamma] = found.theta.map(f64::exp);
         let gamma = gamma.clamp(1.0, 20.0);
         let sea = Jonswap::new(h_m0_m, t_p_s, gamma)?;
-        let around = |value: f64, i: usize| self.around(value, found.covariance[i][i]);
+        let covariance = self.covariance(&lines, &found, &sea)?;
+        let around = |value: f64, i: usize| self.around(value, covariance[i][i]);
         let (gamma_low, gamma_high) = around(gamma, 2);
         Ok(JonswapFit {
             sea,
@@ -145,17 +84,15 @@ impl<'a> Estimate<'a> {
         let lines = self.lines()?;
         let bounds = lines.bounds();
         let start = [lines.h_m0_m.ln(), lines.t_p_s.ln()];
-        let expected = |theta: &[f64; 2]| {
-            let Expected { density, by: [height, period, _] } = self.expected(&lines, &[theta[0], theta[1], 0.0])?;
-            Some(Expected { density, by: [height, period] })
-        };
+        let expected = |theta: &[f64; 2]| self.expected(&lines, theta);
         let found = climb(lines.measured, start, &[bounds[0], bounds[1]], expected).ok_or(FitError::Undetermined)?;
         let [h_m0_m, t_p_s] = found.theta.map(f64::exp);
         let sea = PiersonMoskowitz::new(h_m0_m, t_p_s)?;
+        let covariance = self.covariance(&lines, &found, &sea)?;
         Ok(PiersonMoskowitzFit {
             sea,
-            h_m0_m: self.around(h_m0_m, found.covariance[0][0]),
-            t_p_s: self.around(t_p_s, found.covariance[1][1]),
+            h_m0_m: self.around(h_m0_m, covariance[0][0]),
+            t_p_s: self.around(t_p_s, covariance[1][1]),
             goodness: self.goodness(&lines, &sea, 2),
         })
     }
@@ -191,22 +128,44 @@ impl<'a> Estimate<'a> {
         climb(lines.measured, start, &[height, period, gamma_bounds], |theta| self.expected(lines, theta))
     }
 
-    /// What is expected of each line, and its derivatives by the logarithms of H_m0, T_p and γ.
-    fn expected(&self, lines: &Lines<'_>, theta: &[f64; 3]) -> Option<Expected<3>> {
-        let [h_m0_m, t_p_s, gamma] = theta.map(f64::exp);
+    /// What is expected of each line, and its derivatives by the first N of the logarithms of H_m0, T_p and γ.
+    fn expected<const N: usize>(&self, lines: &Lines<'_>, theta: &[f64; N]) -> Option<Expected<N>> {
+        // Without γ it is 1.
+        let [h_m0_m, t_p_s, gamma] = [0, 1, 2].map(|i| theta.get(i).copied().unwrap_or(0.0).exp());
         let sea = Jonswap::new(h_m0_m, t_p_s, gamma.clamp(1.0, 20.0)).ok()?;
         let df_hz = self.spectrum.df_hz();
         let spread = |of: &dyn Fn(f64) -> f64| self.scatter.expected(lines.range.clone(), |line| of(line * df_hz));
         let bare = spread(&|f_hz| sea.density_m2_per_hz(f_hz));
-        let by = [
-            bare.iter().map(|density| 2.0 * density).collect(),
-            spread(&|f_hz| sea.density_m2_per_hz(f_hz) * sea.log_slope_by_period(f_hz)),
-            {
+        let by = std::array::from_fn(|i| match i {
+            0 => bare.iter().map(|density| 2.0 * density).collect(),
+            1 => spread(&|f_hz| sea.density_m2_per_hz(f_hz) * sea.log_slope_by_period(f_hz)),
+            _ => {
                 let mean = sea.enhancement_mean();
                 spread(&|f_hz| sea.density_m2_per_hz(f_hz) * (sea.enhancement_exponent(f_hz) - mean))
-            },
-        ];
+            }
+        });
         Some(Expected { density: bare.iter().map(|density| density + self.noise_m2_per_hz).collect(), by })
+    }
+
+    /// Covariance of the parameters' logarithms for ν = 2.
+    fn covariance<const N: usize>(
+        &self,
+        lines: &Lines<'_>,
+        found: &Found<N>,
+        sea: &impl Spectrum,
+    ) -> Result<[[f64; N]; N], FitError> {
+        let Expected { density, by } = self.expected(lines, &found.theta).ok_or(FitError::Undetermined)?;
+        let df_hz = self.spectrum.df_hz();
+        // A slope is Σ (Ŝ/E − 1) ∂ ln E/∂θ: a sum of lines with the weights ∂E/∂θ/E².
+        let slopes = by.map(|by| {
+            let weights: Vec<f64> = by.iter().zip(&density).map(|(by, density)| by / (density * density)).collect();
+            let truth = self.scatter.true_weights(lines.range.clone(), &weights);
+            let scaled = truth.into_iter().map(|(line, w)| w * (sea.density_m2_per_hz(line * df_hz) + self.noise_m2_per_hz));
+            scaled.collect::<Vec<f64>>()
+        });
+        let square = |i: usize, j: usize| slopes[i].iter().zip(&slopes[j]).map(|(a, b)| a * b).sum::<f64>();
+        let slopes: [[f64; N]; N] = std::array::from_fn(|i| std::array::from_fn(|j| square(i, j)));
+        Ok(product(&product(&found.covariance, &slopes), &found.covariance))
     }
 
     /// `variance` is that of the logarithm for ν = 2.
@@ -235,6 +194,10 @@ impl Lines<'_> {
         let (height, period) = (self.h_m0_m.ln(), self.t_p_s.ln());
         [(height - 7.0, height + 7.0), (period - PERIOD_FACTOR.ln(), period + PERIOD_FACTOR.ln())]
     }
+}
+
+fn product<const N: usize>(a: &[[f64; N]; N], b: &[[f64; N]; N]) -> [[f64; N]; N] {
+    std::array::from_fn(|i| std::array::from_fn(|j| (0..N).map(|k| a[i][k] * b[k][j]).sum()))
 }
 
 #[cfg(test)]

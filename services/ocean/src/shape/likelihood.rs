@@ -16,7 +16,7 @@ pub(super) struct Expected<const N: usize> {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Found<const N: usize> {
     pub(super) theta: [f64; N],
-    /// Covariance of the parameters per unit of 2/ν.
+    /// Inverse of the information per unit of ν/2: the parameters' covariance where lines are independent.
     pub(super) covariance: [[f64; N]; N],
     /// Σ (−ln E − Ŝ/E).
     pub(super) likelihood: f64,

@@ -107,6 +107,25 @@ impl Scatter {
             })
             .collect()
     }
+
+    /// What a sum of estimated `lines` with these weights is a sum of: frequencies in lines and the weights of the true density
+    /// there, scaled so that the sum's variance is 2/`joint_dof` Σ (weight × density)².
+    pub(super) fn true_weights(&self, lines: std::ops::Range<usize>, weights: &[f64]) -> Vec<(f64, f64)> {
+        let Some(spread) = &self.spread else { return lines.map(|line| line as f64).zip(weights.iter().copied()).collect() };
+        let first = 2.0 * lines.start as f64 - REACH as f64;
+        let mut halves = vec![0.0; 2 * weights.len() + 2 * REACH];
+        for (line, weight) in weights.iter().enumerate() {
+            let middle = 2 * line + REACH;
+            halves[middle] += spread[0] * weight;
+            for (distance, share) in spread.iter().enumerate().skip(1) {
+                halves[middle - distance] += share * weight;
+                halves[middle + distance] += share * weight;
+            }
+        }
+        // Twice as many halves as lines, of half the weight each: their squares are half of what those of lines are.
+        let scaled = |(i, weight): (usize, f64)| (0.5 * (first + i as f64), std::f64::consts::SQRT_2 * weight);
+        halves.into_iter().enumerate().map(scaled).collect()
+    }
 }
 
 /// Shares of a line's estimate by distance in half lines: the squared transform of the taper a + b cos, which is a sinc and its
@@ -173,6 +192,9 @@ mod tests {
         assert_relative_eq!(shares[2], 1.0 / 12.0, max_relative = 1e-4);
         assert!(shares[4] < 1e-12 && shares[6] < 1e-12);
         let even = scatter(64, Taper::Hamming, 640).expected(3..20, |_| 2.0);
+        // And back: of even weights everything is even, and squares add up to as much, but for the ends.
+        let squares: f64 = scatter(64, Taper::Hamming, 640).true_weights(3..203, &[2.0; 200]).iter().map(|(_, w)| w * w).sum();
+        assert_relative_eq!(squares, 200.0 * 4.0, max_relative = 0.01);
         assert!(even.len() == 17 && even.iter().all(|density| (density - 2.0).abs() < 1e-12));
     }
 

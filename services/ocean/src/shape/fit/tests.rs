@@ -115,3 +115,26 @@ fn what_cannot_be_fitted_is_refused_by_name() {
         let _ = estimate(&spectrum, &scatter, (0.0, 1.0)).pierson_moskowitz();
     }
 }
+
+/// Segments in which a peak is no wider than the taper's main lobe, a narrow peak and a broad one, quarter-hours: as above.
+#[test]
+fn intervals_hold_in_short_segments_too() {
+    for (gamma, segment_samples, samples) in [(6.0, 200, 3600), (1.7, 400, 3600), (3.3, 200, 1800)] {
+        let truth = Jonswap::new(2.0, 10.0, gamma).unwrap();
+        let welch = Welch::new(segment_samples);
+        let scatter = Scatter::of(&welch, samples).unwrap();
+        let (mut seas, seeds) = (Sea::new(&truth, 2.0, 8192, 23), 300);
+        let mut held = [0_u32; 3];
+        for _ in 0..seeds {
+            let spectrum = welch.spectrum(&Record::new(&seas.draw()[..samples], 2.0).unwrap()).unwrap();
+            let found = estimate(&spectrum, &scatter, (0.0, 0.8)).jonswap().unwrap();
+            let stated = [(found.h_m0_m, 2.0), (found.t_p_s, 10.0), (found.gamma, gamma)];
+            held.iter_mut().zip(stated).for_each(|(held, (interval, truth))| {
+                *held += u32::from((interval.0..=interval.1).contains(&truth));
+            });
+        }
+        let shares = held.map(|count| f64::from(count) / f64::from(seeds));
+        println!("gamma {gamma}, {segment_samples} of {samples} samples: {shares:.3?}");
+        assert!(shares.iter().all(|share| (0.92..=0.98).contains(share)), "{gamma} {segment_samples}: {shares:?}");
+    }
+}
