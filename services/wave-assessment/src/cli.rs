@@ -2,6 +2,7 @@
 
 mod crests;
 mod report;
+mod shape;
 mod survey;
 mod verdict;
 
@@ -13,7 +14,8 @@ use halcyon_ocean::quality::{Finding, Flag, Limits, RawSeries, assess};
 
 pub use crests::CrestReport;
 pub use report::{Band, Burst, FlagReport, Spectrum, WavesReport, ZeroCrossing};
-pub use survey::{Heights, SeaReport, Survey, SurveyError};
+pub use shape::{Fit, Shape, System};
+pub use survey::{ComplaintReport, DirectionReport, Heights, SeaReport, Survey, SurveyError};
 pub use verdict::{ReasonReport, VerdictReport, verdict};
 
 use crate::table::{Choice, ChoiceError, Table, TableError};

@@ -108,6 +108,28 @@ fn it_takes_its_time() {
     }
 }
 
+/// The sea travels towards 60°, and so comes from 240°; its peak is as long as dispersion has it.
+#[test]
+fn directions_and_quiet_moments_are_told() {
+    for seed in 0..3 {
+        let found = last(|_| {}, &Camera::default().film(&Sea::jonswap(0.06, 1.5, seed), 301));
+        let found_from = found.directional.unwrap();
+        let off_deg = found_from.from_rad.value.to_degrees() - 240.0;
+        assert!(off_deg.abs() < 12.0, "{off_deg}° off: {found_from:?}");
+        assert!(found_from.from_rad.low < found_from.from_rad.value && found_from.spread_rad < 0.8, "{found_from:?}");
+        let length_m = support::GRAVITY_MPS2 * 1.5 * 1.5 / std::f64::consts::TAU;
+        assert!((found_from.wavelength_peak_m / length_m - 1.0).abs() < 0.25, "{found_from:?} of {length_m} m");
+        let calm = found.calm.unwrap();
+        assert!(calm.error_share > 0.1 && calm.error_share < 1.1, "{calm:?}");
+        // Small waves keep the limits for as long as anything is known of them.
+        assert!(calm.windows.first().is_some_and(|w| w.to.seconds_since(w.from) >= 1.5), "{calm:?}");
+        assert!(found.spectrum.is_some_and(|s| s.factors_95[0] < 1.0 && s.factors_95[1] > 1.0));
+    }
+    // Still water comes from nowhere.
+    let still = last(|_| {}, &Camera::default().film(&Sea::default(), 301));
+    assert_eq!((still.directional, still.calm, still.spectrum), (None, None, None));
+}
+
 /// A swell of half a metre, ten times as long as the footprint: the grids are all but flat, the level is not.
 #[test]
 fn a_swell_longer_than_the_footprint_is_not_overlooked() {

@@ -21,7 +21,8 @@ export const vehicle = (over: Partial<Vehicle> = {}): Vehicle => ({
 export const sea = (over: Partial<SeaState> = {}): SeaState => ({
   rig: 'leader-1', stamp: stamp(0), age_s: 0, stale: false, window_start: stamp(-30), window_s: 30, local: place, patches: 150,
   coverage: 0.9, waves: 60, h_mean_m: null, h_s_m: { value: 0.05, low: 0.045, high: 0.056 }, h_max_m: null, h_m0_m: null, t_z_s: null,
-  slope_rms_rad: null, trace: [], verdict: { state: 'safe', reasons: [], valid_until: stamp(10), expired: false },
+  slope_rms_rad: null, h_rms_m: null, h_tenth_m: null, t_p_s: null, t_m01_s: null, t_m02_s: null, t_e_s: null, vertical_speed_rms_mps: null,
+  directional: null, quality: [], calm: null, trace: [], verdict: { state: 'safe', probability: null, reasons: [], valid_until: stamp(10), expired: false },
   ...over,
 });
 

@@ -124,9 +124,16 @@ fn heights(sea: &SeaReport) -> Vec<[String; 2]> {
         ("H_m", h.h_mean_m, h.h_mean_m_low, h.h_mean_m_high, "m"),
         ("H_s", h.h_s_m, h.h_s_m_low, h.h_s_m_high, "m"),
         ("highest wave", h.h_max_m, h.h_max_m_low, h.h_max_m_high, "m"),
+        ("H_rms", h.h_rms_m, h.h_rms_m_low, h.h_rms_m_high, "m"),
+        ("H_1/10", h.h_tenth_m, h.h_tenth_m_low, h.h_tenth_m_high, "m"),
         ("H_m0", h.h_m0_m, h.h_m0_m_low, h.h_m0_m_high, "m"),
         ("T_z", h.t_z_s, h.t_z_s_low, h.t_z_s_high, "s"),
+        ("T_p", h.t_p_s, h.t_p_s_low, h.t_p_s_high, "s"),
+        ("T_m01", h.t_m01_s, h.t_m01_s_low, h.t_m01_s_high, "s"),
+        ("T_m02", h.t_m02_s, h.t_m02_s_low, h.t_m02_s_high, "s"),
+        ("T_e", h.t_e_s, h.t_e_s_low, h.t_e_s_high, "s"),
         ("RMS slope", h.slope_rms_rad, h.slope_rms_rad_low, h.slope_rms_rad_high, "rad"),
+        ("RMS rise", h.vertical_speed_rms_mps, h.vertical_speed_rms_mps_low, h.vertical_speed_rms_mps_high, "m/s"),
     ];
     let text = |(name, value, low, high, unit): (&str, Option<f64>, Option<f64>, Option<f64>, &str)| {
         let text = match (value, low, high) {
@@ -137,7 +144,19 @@ fn heights(sea: &SeaReport) -> Vec<[String; 2]> {
         };
         [name.to_owned(), text]
     };
-    all.into_iter().map(text).collect()
+    let direction = sea.direction.map_or_else(
+        || "not known".to_owned(),
+        |found| {
+            format!(
+                "{:.0}° ± {:.0}°, spread {:.0}°, wavelength at the peak {} m",
+                found.from_deg,
+                found.from_error_deg,
+                found.spread_deg,
+                four(found.wavelength_peak_m)
+            )
+        },
+    );
+    all.into_iter().map(text).chain([["waves come from".to_owned(), direction]]).collect()
 }
 
 fn print(judged: &Judged) -> anyhow::Result<()> {

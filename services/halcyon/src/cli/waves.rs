@@ -249,6 +249,9 @@ pub(super) fn rows(burst: &Burst) -> Vec<(String, String)> {
             add("  m0", format!("{:.4e} m²", s.m0));
         }
     }
+    if let Some(shape) = &burst.shape {
+        shape_rows(shape, &mut add);
+    }
     add("skewness, kurtosis", format!("{}, {}", four(burst.skewness), four(burst.kurtosis)));
     for of in &burst.crest_statistics {
         add(
@@ -264,6 +267,50 @@ pub(super) fn rows(burst: &Burst) -> Vec<(String, String)> {
         );
     }
     rows
+}
+
+/// What the spectrum says beyond its moments.
+fn shape_rows(shape: &cli::Shape, add: &mut impl FnMut(&str, String)) {
+    add(
+        "  T_p by parabola, Young, T_pc, Delft",
+        format!(
+            "{}, {}, {}, {} s",
+            four(shape.t_p_parabola_s),
+            four(shape.t_p_young_s),
+            four(shape.t_pc_s),
+            four(shape.t_pd_s)
+        ),
+    );
+    match (shape.noise_m2_per_hz, shape.noise_error_m2_per_hz, shape.h_m0_less_noise_m) {
+        (Some(noise), Some(error), Some(h_m0_m)) => {
+            add("  noise floor", format!("{noise:.2e} ± {error:.2e} m²/Hz; H_m0 without it {} m", four(h_m0_m)));
+        }
+        _ => add("  noise floor", "none that stands out".into()),
+    }
+    for system in &shape.systems {
+        let (h, t_p, t_m02) = (four(system.h_m0_m), four(system.t_p_s), four(system.t_m02_s));
+        add(&format!("  {}", system.kind), format!("H_m0 {h} m, T_p {t_p} s, T_m02 {t_m02} s"));
+    }
+    let fits = [("JONSWAP fitted", &shape.jonswap), ("Pierson-Moskowitz fitted", &shape.pierson_moskowitz)];
+    for (name, fit) in fits.into_iter().filter_map(|(name, fit)| Some((name, fit.as_ref()?))) {
+        let gamma = match (fit.gamma, fit.gamma_low, fit.gamma_high) {
+            (Some(gamma), Some(low), Some(high)) => format!(", γ {} ({} to {})", four(gamma), four(low), four(high)),
+            _ => String::new(),
+        };
+        let shape = if fit.misfit_sigmas > 3.0 { "; the sea has another shape" } else { "" };
+        add(
+            &format!("  {name}"),
+            format!(
+                "H_m0 {} m ({} to {}), T_p {} s ({} to {}){gamma}{shape}",
+                four(fit.h_m0_m),
+                four(fit.h_m0_m_low),
+                four(fit.h_m0_m_high),
+                four(fit.t_p_s),
+                four(fit.t_p_s_low),
+                four(fit.t_p_s_high)
+            ),
+        );
+    }
 }
 
 /// How often heights are exceeded, seen and by theory.

@@ -8,6 +8,7 @@ use halcyon_ocean::{Record, SampledSpectrum, Taper, Welch};
 use serde::Serialize;
 
 use super::crests::{CrestReport, crests};
+use super::shape::Shape;
 use crate::table::Readings;
 
 /// A file's waves.
@@ -71,6 +72,9 @@ pub struct Burst {
     /// From the spectrum; absent where it holds no energy.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spectrum: Option<Spectrum>,
+    /// What the spectrum says beyond its moments; absent where it holds no energy.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shape: Option<Shape>,
     /// Crests and heights against theories; empty with too few waves.
     pub crest_statistics: Vec<CrestReport>,
     /// Every quality test.
@@ -247,7 +251,8 @@ impl Burst {
         let mean_m = even.record.mean_m();
         let record = even.record.clone().without_trend();
         let up = waves(&record, Crossing::Up, 0.0);
-        let density = Welch { taper, ..Welch::with_segments_of_s(segment_s, &record) }.spectrum(&record)?;
+        let welch = Welch { taper, ..Welch::with_segments_of_s(segment_s, &record) };
+        let density = welch.spectrum(&record)?;
         let band_hz = (band_hz.0, band_hz.1.min(0.5 * record.rate_hz()));
         let spectrum = Spectrum::of(&record, &density, band_hz);
         let crest_statistics = spectrum.as_ref().map_or_else(Vec::new, |spectrum| crests(&up, spectrum, &density));
@@ -264,6 +269,7 @@ impl Burst {
             zero_up: ZeroCrossing::of(&up),
             zero_down: ZeroCrossing::of(&waves(&record, Crossing::Down, 0.0)),
             spectrum,
+            shape: Shape::of(&welch, record.samples_m().len(), &density, band_hz),
             crest_statistics,
             quality: assessment.findings.iter().map(FlagReport::from).collect(),
             density: Some(density),

@@ -51,6 +51,11 @@ pub struct SeaReport {
     /// H_m, H_s, H_max, H_m0, T_z and slope, each with its 95 % interval.
     #[serde(flatten)]
     pub heights: Heights,
+    /// Where the waves come from; absent where the patches do not tell.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub direction: Option<DirectionReport>,
+    /// Quality tests that did not pass.
+    pub quality: Vec<ComplaintReport>,
     /// The elevation at the middle of the patches, as `halcyon waves` has it; absent where it is too short.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub centre: Option<Burst>,
@@ -104,6 +109,44 @@ estimates! {
     t_z_s, t_z_s_low, t_z_s_high;
     /// Root mean square slope, radians.
     slope_rms_rad, slope_rms_rad_low, slope_rms_rad_high;
+    /// Root mean square wave height, metres.
+    h_rms_m, h_rms_m_low, h_rms_m_high;
+    /// Mean of the highest tenth, metres.
+    h_tenth_m, h_tenth_m_low, h_tenth_m_high;
+    /// Peak period, seconds.
+    t_p_s, t_p_s_low, t_p_s_high;
+    /// m0/m1, seconds.
+    t_m01_s, t_m01_s_low, t_m01_s_high;
+    /// √(m0/m2), seconds.
+    t_m02_s, t_m02_s_low, t_m02_s_high;
+    /// m₋₁/m0, seconds.
+    t_e_s, t_e_s_low, t_e_s_high;
+    /// Root mean square vertical speed of the surface, metres per second.
+    vertical_speed_rms_mps, vertical_speed_rms_mps_low, vertical_speed_rms_mps_high;
+}
+
+/// Direction and length of the waves.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct DirectionReport {
+    /// Where they come from, degrees clockwise from true north (from the survey's own north, where the rig has no heading).
+    pub from_deg: f64,
+    /// 95 % of it: so much to either side, degrees.
+    pub from_error_deg: f64,
+    /// Circular spread, degrees.
+    pub spread_deg: f64,
+    /// Length at the peak, metres.
+    pub wavelength_peak_m: f64,
+}
+
+/// A quality test that did not pass.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ComplaintReport {
+    /// Its name.
+    pub test: String,
+    /// Failed, and not only suspect.
+    pub failed: bool,
+    /// In words.
+    pub reason: String,
 }
 
 impl Survey {
@@ -155,6 +198,17 @@ impl Survey {
             coverage: sea.coverage,
             waves: sea.waves,
             heights: Heights::of(&sea),
+            direction: sea.directional.map(|found| DirectionReport {
+                from_deg: found.from_rad.value.to_degrees().rem_euclid(360.0),
+                from_error_deg: (found.from_rad.high - found.from_rad.value).to_degrees(),
+                spread_deg: found.spread_rad.to_degrees(),
+                wavelength_peak_m: found.wavelength_peak_m,
+            }),
+            quality: sea
+                .quality
+                .iter()
+                .map(|flag| ComplaintReport { test: flag.test.clone(), failed: flag.failed, reason: flag.text.clone() })
+                .collect(),
             centre,
             verdict: VerdictReport {
                 state: sea.verdict.state.as_str(),

@@ -1,11 +1,10 @@
 //! Quiet moments of the next seconds, by the waves that the window has seen.
 
-use halcyon_model::{CalmForecast, CalmWindow, LocalPoint, Stamp};
+use halcyon_model::{CalmForecast, CalmWindow, Directional, LocalPoint, Stamp};
 use halcyon_ocean::forecast::grid::interpolated;
 use halcyon_ocean::forecast::{Forecast, Grid, Level, Limits, Options, Reading, Spot};
 use halcyon_ocean::{CosTwoS, SampledSpectrum};
 
-use super::direction::Direction;
 use super::spectrum::Spectral;
 use super::window::Window;
 use crate::config::Config;
@@ -21,7 +20,7 @@ const ERROR_AHEAD_S: f64 = 3.0;
 pub(crate) fn calm(
     window: &Window,
     spectral: &Spectral,
-    direction: &Direction,
+    direction: &Directional,
     place: LocalPoint,
     config: &Config,
 ) -> Option<CalmForecast> {
@@ -30,9 +29,9 @@ pub(crate) fn calm(
     let options = Options { level: Level::Free, ..Options::default() };
     let table = SampledSpectrum::new(spectral.spectrum.df_hz, spectral.spectrum.density_m2_per_hz.clone()).ok()?;
     // m1 = s/(s + 1) for cos-2s, and the circular spread is √(2 (1 − m1)).
-    let m1 = (1.0 - 0.5 * direction.directional.spread_rad.powi(2)).clamp(0.1, 0.98);
+    let m1 = (1.0 - 0.5 * direction.spread_rad.powi(2)).clamp(0.1, 0.98);
     let spread = CosTwoS::new(m1 / (1.0 - m1)).ok()?;
-    let towards_rad = direction.directional.from_rad.value + std::f64::consts::PI;
+    let towards_rad = direction.from_rad.value + std::f64::consts::PI;
     let footprint_m = window.newest()?.footprint_m;
     let grid = Grid::about_peak(1.0 / spectral.t_p_s.value, options.span_s + AHEAD_S, 2.0 * footprint_m);
     let prior = grid.spread(interpolated(&table), towards_rad, spread).ok()?;

@@ -1,9 +1,9 @@
 //! From patch to sea state.
 
-use halcyon_model::{IdError, LocalPoint, RigId, SeaState, Stamp, SurfacePatch, Verdict, VerdictReason, VerdictState};
+use halcyon_model::{Directional, IdError, LocalPoint, RigId, SeaState, Stamp, SurfacePatch, Verdict, VerdictReason, VerdictState};
 
 use super::ahead::calm;
-use super::direction::Direction;
+use super::direction::directional;
 use super::film::film;
 use super::hidden::{Hidden, hidden};
 use super::patch::{self, PatchError};
@@ -26,7 +26,7 @@ pub struct Assessor {
     issued: Option<Stamp>,
     verdict: VerdictState,
     /// What was last found of directions, by patch time: they change slowly, and take a film to find.
-    direction: Option<(Stamp, Option<Direction>)>,
+    direction: Option<(Stamp, Option<Directional>)>,
 }
 
 /// Directions are looked for once in so many seconds of patch time.
@@ -132,7 +132,7 @@ impl Assessor {
             let (statistics, interval_s) = (statistics?, interval_s?);
             // Fewer seconds have no segment of a spectrum.
             let (film, _) = film(&self.window, interval_s)?;
-            Direction::of(&film, statistics.t_z_s?.value, statistics.freedom)
+            directional(&film, statistics.t_z_s?.value, statistics.freedom)
         };
         self.direction = Some((newest, found()));
     }
@@ -186,7 +186,11 @@ impl Assessor {
         let statistics = evidence.and_then(|evidence| evidence.statistics.as_ref());
         let spectral = statistics.and_then(|s| s.spectral.as_ref());
         let direction = self.direction.as_ref().and_then(|(_, found)| found.as_ref()).filter(|_| statistics.is_some());
-        let calm = spectral.zip(direction).and_then(|(s, d)| calm(&self.window, s, d, position, &self.config));
+        let calm = spectral
+            .zip(direction)
+            // What cannot be trusted is not forecast.
+            .filter(|_| judgement.probability.is_some())
+            .and_then(|(spectral, direction)| calm(&self.window, spectral, direction, position, &self.config));
         let Judgement { state, reasons, probability } = judgement;
         let frames = self.window.frames();
         let (start, end) = (frames.front().map_or(measured, |f| f.stamp), frames.back().map_or(measured, |f| f.stamp));
@@ -212,7 +216,7 @@ impl Assessor {
             t_m02_s: spectral.map(|s| s.t_m02_s),
             t_e_s: spectral.map(|s| s.t_e_s),
             vertical_speed_rms_mps: statistics.map(Statistics::vertical_speed_rms_mps),
-            directional: direction.map(|d| d.directional),
+            directional: direction.copied(),
             spectrum: spectral.map(|s| s.spectrum.clone()),
             quality: evidence.map_or_else(Vec::new, |e| e.quality.clone()),
             calm,

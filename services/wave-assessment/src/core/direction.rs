@@ -1,44 +1,32 @@
 //! Where the waves come from, by the window's film.
 
 use halcyon_model::{Directional, Estimate};
-use halcyon_ocean::space::{Array, DirectionalSpectrum, Film, Removed, Water};
+use halcyon_ocean::space::{Array, Film, Removed, Water};
 
-/// Segments, seconds: half a minute resolves a peak and leaves a few of them in a window.
+/// Segments, seconds: a third of a minute resolves a peak and leaves a few of them in a window.
 const SEGMENT_S: f64 = 20.0;
 /// Frequencies looked at, over the mean zero-crossing one.
 const BAND: (f64, f64) = (0.6, 2.0);
 /// A direction this uncertain is none, radians.
 const UNCERTAIN_RAD: f64 = 0.5;
 
-/// What the film of a window tells of directions.
-#[derive(Debug, Clone)]
-pub(crate) struct Direction {
-    pub directional: Directional,
-    pub spectrum: DirectionalSpectrum,
-}
-
-impl Direction {
-    /// Of a film of waves of the period `t_z_s`; `freedom` is that of the window's variance. `None` where waves come from everywhere, or too few
-    /// of them came.
-    pub(crate) fn of(film: &Film, t_z_s: f64, freedom: f64) -> Option<Self> {
-        let segment = (SEGMENT_S.min(0.5 * film.duration_s()) * film.rate_hz()).round() as usize;
-        let f_z_hz = 1.0 / t_z_s;
-        let band_hz = (BAND.0 * f_z_hz, (BAND.1 * f_z_hz).min(0.45 * film.rate_hz()));
-        let water = Water::DEEP;
-        let spectrum = Array::new(Removed::Mean, segment, band_hz).spectrum(film, &water).ok()?;
-        let overall = spectrum.overall()?;
-        let (from_rad, spread_rad) = (overall.direction_from_rad(), overall.spread_rad());
-        let (wavelength_peak_m, _) = spectrum.wavelengths_m(&water)?;
-        // The mean of as many directions as the variance has degrees of freedom.
-        let error_rad = 1.96 * spread_rad / freedom.max(1.0).sqrt();
-        let known = from_rad.is_finite() && spread_rad.is_finite() && wavelength_peak_m > 0.0 && error_rad < UNCERTAIN_RAD;
-        known.then_some(Self {
-            directional: Directional {
-                from_rad: Estimate { value: from_rad, low: from_rad - error_rad, high: from_rad + error_rad },
-                spread_rad,
-                wavelength_peak_m,
-            },
-            spectrum,
-        })
-    }
+/// Directions of a film of waves of the period `t_z_s`; `freedom` is that of the window's variance. `None` where waves come from
+/// everywhere, or too few of them came.
+pub(crate) fn directional(film: &Film, t_z_s: f64, freedom: f64) -> Option<Directional> {
+    let segment = (SEGMENT_S.min(0.5 * film.duration_s()) * film.rate_hz()).round() as usize;
+    let f_z_hz = 1.0 / t_z_s;
+    let band_hz = (BAND.0 * f_z_hz, (BAND.1 * f_z_hz).min(0.45 * film.rate_hz()));
+    let water = Water::DEEP;
+    let spectrum = Array::new(Removed::Mean, segment, band_hz).spectrum(film, &water).ok()?;
+    let overall = spectrum.overall()?;
+    let (from_rad, spread_rad) = (overall.direction_from_rad(), overall.spread_rad());
+    let (wavelength_peak_m, _) = spectrum.wavelengths_m(&water)?;
+    // The mean of as many directions as the variance has degrees of freedom.
+    let error_rad = 1.96 * spread_rad / freedom.max(1.0).sqrt();
+    let known = from_rad.is_finite() && spread_rad.is_finite() && wavelength_peak_m > 0.0 && error_rad < UNCERTAIN_RAD;
+    known.then_some(Directional {
+        from_rad: Estimate { value: from_rad, low: from_rad - error_rad, high: from_rad + error_rad },
+        spread_rad,
+        wavelength_peak_m,
+    })
 }

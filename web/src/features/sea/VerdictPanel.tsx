@@ -1,10 +1,11 @@
 /** May something land here? The answer in large type, how long it holds, and every reason. */
-import type { Estimate } from '../../api/types';
+import type { Estimate, SeaState } from '../../api/types';
 import { age, countdown, waveHeight } from '../../lib/format';
 import { select } from '../../lib/url-state';
 import { fleetNow_ms, seas } from '../../state/store';
 import { Icon } from '../../ui/Icon';
 import { Panel } from '../../ui/Panel';
+import { seaFacts } from './facts';
 import { judgement, rig, sea } from './selection';
 
 export function VerdictPanel() {
@@ -45,6 +46,7 @@ export function VerdictPanel() {
       ) : (
         <div class={judgement.value.left_s === null ? 'history' : ''}>
           <HeightRow estimate={state.h_s_m} />
+          <Facts state={state} />
           <ul class="reasons" aria-label="Checks" data-testid="reasons">
             {state.verdict.reasons.map((reason) => (
               <li key={reason.check} class={reason.passed ? 'passed' : 'failed'}>
@@ -57,6 +59,18 @@ export function VerdictPanel() {
         </div>
       )}
     </Panel>
+  );
+}
+
+/** What else is known of the waves, in a line each. */
+function Facts({ state }: { state: SeaState }) {
+  const facts = seaFacts(state, fleetNow_ms.value);
+  return facts.length === 0 ? null : (
+    <dl class="sea-facts" data-testid="sea-facts">
+      {facts.map(({ name, text }) => (
+        <div key={name}><dt>{name}</dt><dd>{text}</dd></div>
+      ))}
+    </dl>
   );
 }
 
