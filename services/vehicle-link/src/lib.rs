@@ -23,6 +23,8 @@ pub mod actor;
 pub mod autopilot;
 pub mod config;
 pub mod core;
+#[cfg(any(test, feature = "experiment"))]
+pub mod experiment;
 pub mod io;
 
 pub use actor::run;
