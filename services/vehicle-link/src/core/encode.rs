@@ -141,3 +141,67 @@ pub fn heartbeat() -> MavMessage {
         mavlink_version: 3,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use halcyon_model::{FleetOrigin, Geodetic};
+
+    use super::*;
+
+    fn sent(asked: &Setpoint, shift_ned_m: Option<Vector3<f64>>) -> Option<MavMessage> {
+        let datum = Datum { frame: FleetOrigin(Geodetic::from_deg(53.1, -2.9, 40.0)).frame(), home_height_m: 1.0 };
+        setpoint(asked, &datum, shift_ned_m, Address::new(7, 1)?, 1234)
+    }
+
+    fn asked() -> Setpoint {
+        Setpoint {
+            position_ned_m: Vector3::new(10.0, 20.0, -6.0),
+            velocity_ned_mps: Vector3::new(1.0, -2.0, 0.5),
+            acceleration_ned_mps2: Some(Vector3::new(0.25, -0.5, 0.0)),
+            heading_rad: Some(1.0),
+        }
+    }
+
+    /// MAVLink's type mask: a set bit ignores; 1024 is yaw, 2048 yaw rate.
+    #[test]
+    fn with_an_acceleration_all_three_go_in_the_autopilots_local_frame() {
+        let Some(MavMessage::SET_POSITION_TARGET_LOCAL_NED(data)) = sent(&asked(), Some(Vector3::new(4.0, -3.0, 1.5))) else {
+            panic!("not local")
+        };
+        assert_eq!((data.x, data.y, data.z), (14.0, 17.0, -4.5));
+        assert_eq!((data.vx, data.vy, data.vz, data.afx, data.afy, data.afz), (1.0, -2.0, 0.5, 0.25, -0.5, 0.0));
+        assert_eq!((data.type_mask.bits(), data.yaw, data.target_system), (2048, 1.0, 7));
+        let unturned = Setpoint { heading_rad: None, ..asked() };
+        let Some(MavMessage::SET_POSITION_TARGET_LOCAL_NED(data)) = sent(&unturned, Some(Vector3::zeros())) else {
+            panic!("not local")
+        };
+        assert_eq!(data.type_mask.bits(), 2048 + 1024);
+    }
+
+    #[test]
+    fn without_one_or_without_the_frame_it_goes_by_latitude_and_longitude() {
+        for (asked, shift) in [(asked(), None), (Setpoint { acceleration_ned_mps2: None, ..asked() }, Some(Vector3::zeros()))] {
+            let Some(MavMessage::SET_POSITION_TARGET_GLOBAL_INT(data)) = sent(&asked, shift) else { panic!("not global") };
+            assert_eq!((data.type_mask.bits(), data.alt), (2048 + 64 + 128 + 256, 5.0));
+        }
+    }
+
+    #[test]
+    fn what_is_not_finite_is_never_sent() {
+        for bad in [f64::NAN, f64::INFINITY] {
+            for axis in 0..3 {
+                for shift in [None, Some(Vector3::zeros())] {
+                    let mut place = asked();
+                    place.position_ned_m[axis] = bad;
+                    let mut velocity = asked();
+                    velocity.velocity_ned_mps[axis] = bad;
+                    assert!(sent(&place, shift).is_none() && sent(&velocity, shift).is_none());
+                }
+                let mut acceleration = asked();
+                acceleration.acceleration_ned_mps2.as_mut().unwrap()[axis] = bad;
+                assert!(sent(&acceleration, Some(Vector3::zeros())).is_none());
+            }
+            assert!(sent(&Setpoint { heading_rad: Some(bad), ..asked() }, None).is_none());
+        }
+    }
+}

@@ -208,6 +208,24 @@ mod tests {
             let h = 1e-5;
             let numeric = (at(h).position_ned_m - at(-h).position_ned_m) / (2.0 * h);
             prop_assert!((numeric - at(0.0).velocity_ned_mps).norm() < 1e-6);
+            // Each derivative is that of the one before it, through every heading.
+            let numeric = (at(h).velocity_ned_mps - at(-h).velocity_ned_mps) / (2.0 * h);
+            prop_assert!((numeric - at(0.0).acceleration_ned_mps2).norm() < 1e-6);
+            let numeric = (at(h).acceleration_ned_mps2 - at(-h).acceleration_ned_mps2) / (2.0 * h);
+            prop_assert!((numeric - at(0.0).jerk_ned_mps3).norm() < 1e-6);
+        }
+    }
+
+    /// A slot that swings round a standing leader flies a circle: v²/r, towards the leader.
+    #[test]
+    fn a_turning_leaders_slot_is_drawn_inwards_by_v_squared_over_r() {
+        for heading_deg in [0.0f64, 89.9, 90.0, 180.0, 270.0, 359.9] {
+            let standing = Motion { velocity_ned_mps: Vector3::zeros(), ..leader(heading_deg.to_radians()) };
+            let slot = slot_motion(&standing, &Slot { forward_m: 3.0, right_m: -4.0, up_m: 0.0 });
+            let speed_mps = slot.velocity_ned_mps.norm();
+            assert_relative_eq!(speed_mps, 0.3 * 5.0, epsilon = 1e-12);
+            let inward = (standing.position_ned_m - slot.position_ned_m) / 5.0;
+            assert_relative_eq!(slot.acceleration_ned_mps2, inward * (speed_mps * speed_mps / 5.0), epsilon = 1e-12);
         }
     }
 

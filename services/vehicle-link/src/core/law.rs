@@ -102,3 +102,43 @@ fn away_from_singularity_deg(heading_deg: f64) -> f64 {
 pub fn offset_ned_m(slot: &Slot, heading_rad: f64) -> Vector3<f64> {
     Rotation3::from_axis_angle(&Vector3::z_axis(), heading_rad) * Vector3::new(slot.forward_m, slot.right_m, -slot.up_m)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// (6-1): the distance is S. (6-2): the line is at right angles to the heading, but for the degree that the thesis gives up at
+    /// its singularities; the right side stays the right side.
+    #[test]
+    fn the_quadratics_place_is_abreast_and_off_by_a_degree_where_it_is_singular() {
+        let leader = Vector3::new(12.0, -7.0, -6.0);
+        for right_m in [5.0, -7.0] {
+            let slot = Slot { forward_m: 0.0, right_m, up_m: 0.0 };
+            for tenth_deg in 0..3600 {
+                let heading_deg = f64::from(tenth_deg) * 0.1;
+                let place = quadratic_place(leader, heading_deg.to_radians(), &slot);
+                let true_place = leader + offset_ned_m(&slot, heading_deg.to_radians());
+                assert!(((place - leader).norm() - right_m.abs()).abs() < 1e-6, "{heading_deg}");
+                let miss_m = (place - true_place).norm();
+                let singular = (heading_deg - 90.0).abs() < 1.0 - 1e-9 || (heading_deg - 270.0).abs() < 1.0 - 1e-9;
+                let most_m = if singular { right_m.abs() * 1.001f64.to_radians() } else { 1e-6 };
+                assert!(miss_m <= most_m, "{heading_deg}: {miss_m}");
+            }
+            let at_singularity = quadratic_place(leader, 90.0f64.to_radians(), &slot);
+            let miss_m = (at_singularity - leader - offset_ned_m(&slot, 90.0f64.to_radians())).norm();
+            // The chord of one degree.
+            assert!((miss_m - 2.0 * right_m.abs() * 0.5f64.to_radians().sin()).abs() < 1e-6, "{miss_m}");
+        }
+    }
+
+    #[test]
+    fn laws_and_locks_have_their_names_and_others_are_refused() {
+        let law = |name: &str| Law::deserialize(serde::de::value::StrDeserializer::<serde::de::value::Error>::new(name));
+        assert_eq!(law("thesis_quadratic"), Ok(Law::ThesisQuadratic));
+        assert_eq!(law("position_only"), Ok(Law::PositionOnly));
+        assert_eq!(law("position_velocity"), Ok(Law::PositionVelocity));
+        assert_eq!(law("position_velocity_acceleration"), Ok(Law::PositionVelocityAcceleration));
+        assert_eq!(law("halcyon"), Ok(Law::default()));
+        assert!(law("thesis").unwrap_err().to_string().contains("thesis_quadratic"));
+    }
+}

@@ -35,7 +35,9 @@ impl LocalFinder {
     /// Takes a message of the autopilot.
     pub fn observe(&mut self, message: &MavMessage, datum: &Datum, now: Stamp) {
         match message {
-            MavMessage::GLOBAL_POSITION_INT(data) => self.fleet = fleet_place(data, datum).map(|ned_m| (data.time_boot_ms, ned_m)),
+            MavMessage::GLOBAL_POSITION_INT(data) => {
+                self.fleet = fleet_place(data, datum).map(|ned_m| (data.time_boot_ms, ned_m))
+            }
             MavMessage::LOCAL_POSITION_NED(data) => {
                 let vector = |x: f32, y: f32, z: f32| Vector3::new(f64::from(x), f64::from(y), f64::from(z));
                 let (place_m, velocity_mps) = (vector(data.x, data.y, data.z), vector(data.vx, data.vy, data.vz));
@@ -132,7 +134,8 @@ mod tests {
     fn messages_of_different_moments_and_nonsense_say_nothing() {
         let mut finder = LocalFinder::default();
         let nan = ardu::LOCAL_POSITION_NED_DATA { x: f32::NAN, time_boot_ms: 5_000, ..Default::default() };
-        let global = ardu::GLOBAL_POSITION_INT_DATA { lat: 531_000_000, lon: -29_000_000, time_boot_ms: 5_000, ..Default::default() };
+        let global =
+            ardu::GLOBAL_POSITION_INT_DATA { lat: 531_000_000, lon: -29_000_000, time_boot_ms: 5_000, ..Default::default() };
         finder.observe(&MavMessage::GLOBAL_POSITION_INT(global.clone()), &datum(), t(0.0));
         finder.observe(&MavMessage::LOCAL_POSITION_NED(nan), &datum(), t(0.0));
         assert_eq!(finder.shift_ned_m(t(0.0)), None);

@@ -110,3 +110,69 @@ fn lean_mps2(state: &VehicleState) -> Vector3<f64> {
     // Beyond 60° nothing here is flying as usual.
     Vector3::new(up.x, up.y, 0.0) * (GRAVITY_MPS2 / (-up.z).max(0.5))
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::UnitQuaternion;
+
+    use super::*;
+    use crate::core::track::tests::{state, t};
+
+    /// A level circle of `r_m` at `speed_mps`, leaning as it must, with a constant push of the wind that the lean makes up for.
+    fn circling(time_s: f64, r_m: f64, speed_mps: f64, wind_mps2: f64) -> VehicleState {
+        let rate = speed_mps / r_m;
+        let (sin, cos) = (rate * time_s).sin_cos();
+        let acceleration = Vector3::new(-cos, -sin, 0.0) * (speed_mps * rate);
+        let lean = acceleration - Vector3::new(wind_mps2, 0.0, 0.0);
+        let up = (lean + Vector3::new(0.0, 0.0, -GRAVITY_MPS2)).normalize();
+        let ned_from_body = UnitQuaternion::rotation_between(&Vector3::new(0.0, 0.0, -1.0), &up).unwrap();
+        VehicleState {
+            position_ned_m: Vector3::new(r_m * cos, r_m * sin, -5.0),
+            velocity_ned_mps: Vector3::new(-sin, cos, 0.0) * speed_mps,
+            ned_from_body,
+            heading_rad: (rate * time_s).rem_euclid(std::f64::consts::TAU),
+            ..state(t(time_s), 0.0)
+        }
+    }
+
+    /// v²/r inwards, v³/r² backwards, v/r round, whatever the wind.
+    #[test]
+    fn on_a_circle_the_acceleration_is_v_squared_over_r() {
+        let (r_m, speed_mps) = (8.0, 3.0);
+        for wind_mps2 in [0.0, 0.6] {
+            let mut observer = Observer::new(&circling(0.0, r_m, speed_mps, wind_mps2));
+            for step in 1..=100u32 {
+                let time_s = 0.1 * f64::from(step);
+                observer.observe(&circling(time_s, r_m, speed_mps, wind_mps2), 0.1);
+                if step < 40 {
+                    continue;
+                }
+                let (sin, cos) = (speed_mps / r_m * time_s).sin_cos();
+                let acceleration = Vector3::new(-cos, -sin, 0.0) * (speed_mps * speed_mps / r_m);
+                let jerk = Vector3::new(sin, -cos, 0.0) * (speed_mps.powi(3) / (r_m * r_m));
+                assert!(
+                    (observer.acceleration_ned_mps2() - acceleration).norm() < 0.02,
+                    "{}",
+                    observer.acceleration_ned_mps2()
+                );
+                assert!((observer.jerk_ned_mps3() - jerk).norm() < 0.05, "{}", observer.jerk_ned_mps3());
+                assert!((observer.yaw_rate_radps() - speed_mps / r_m).abs() < 1e-3);
+            }
+        }
+    }
+
+    #[test]
+    fn a_jump_stays_within_bounds() {
+        let mut observer = Observer::new(&state(t(0.0), 0.0));
+        let jumped = VehicleState {
+            velocity_ned_mps: Vector3::new(90.0, -90.0, 0.0),
+            ned_from_body: UnitQuaternion::from_euler_angles(1.5, 1.5, 0.0),
+            heading_rad: 3.0,
+            ..state(t(0.01), 0.0)
+        };
+        observer.observe(&jumped, 0.01);
+        assert!(observer.acceleration_ned_mps2().norm() <= ACCELERATION_MPS2_MAX + 1e-9);
+        assert!(observer.jerk_ned_mps3().norm() <= JERK_MPS3_MAX + 1e-9);
+        assert!(observer.yaw_rate_radps().abs() <= YAW_RATE_RADPS_MAX);
+    }
+}

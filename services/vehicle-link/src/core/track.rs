@@ -121,7 +121,12 @@ impl Track {
     #[must_use]
     pub fn predict(&self, now: Stamp, ahead_s: f64) -> Motion {
         let jerk_ned_mps3 = self.observer.jerk_ned_mps3();
-        self.carried_on(self.age_s(now, ahead_s), self.observer.acceleration_ned_mps2(), jerk_ned_mps3, self.observer.yaw_rate_radps())
+        self.carried_on(
+            self.age_s(now, ahead_s),
+            self.observer.acceleration_ned_mps2(),
+            jerk_ned_mps3,
+            self.observer.yaw_rate_radps(),
+        )
     }
 
     /// The same with the acceleration and the yaw rate that filtered differences give, for the plain law.
@@ -181,17 +186,17 @@ pub fn wrap_rad(angle_rad: f64) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use halcyon_model::{Activity, Geodetic, LandedState, Role, VehicleId};
     use nalgebra::UnitQuaternion;
 
     use super::*;
 
-    fn t(s: f64) -> Stamp {
+    pub(in crate::core) fn t(s: f64) -> Stamp {
         Stamp::from_secs_f64(1000.0).plus_secs_f64(s)
     }
 
-    fn state(stamp: Stamp, north_m: f64) -> VehicleState {
+    pub(in crate::core) fn state(stamp: Stamp, north_m: f64) -> VehicleState {
         VehicleState {
             stamp,
             vehicle: VehicleId::new("other").unwrap(),
@@ -240,5 +245,31 @@ mod tests {
         // An ordinary late one is still no news.
         track.observe(state(t(1.0), 9.0), t(1.2));
         assert_eq!(track.state.position_ned_m.x, 4.1);
+    }
+
+    /// The prediction is the solution of its own differential equation: each derivative is that of the one before it, and the jerk
+    /// dies away with the lean's time constant.
+    #[test]
+    fn a_prediction_is_consistent() {
+        let mut track = Track::new(state(t(0.0), 0.0), t(0.0));
+        for step in 1..=5u32 {
+            let time_s = 0.1 * f64::from(step);
+            let leaning = VehicleState {
+                velocity_ned_mps: Vector3::new(2.0 * time_s * time_s, 0.3 * time_s, 0.0),
+                ned_from_body: UnitQuaternion::from_euler_angles(0.1 * time_s, -0.4 * time_s, 0.0),
+                ..state(t(time_s), 0.5 * time_s)
+            };
+            track.observe(leaning, t(time_s));
+        }
+        let h = 1e-4;
+        for ahead_s in [0.1, 0.3, 0.6] {
+            let at = |shift_s: f64| track.predict(t(0.5), ahead_s + shift_s);
+            let (before, here, after) = (at(-h), at(0.0), at(h));
+            let slope = |a: Vector3<f64>, b: Vector3<f64>| (b - a) / (2.0 * h);
+            assert!((slope(before.position_ned_m, after.position_ned_m) - here.velocity_ned_mps).norm() < 1e-5);
+            assert!((slope(before.velocity_ned_mps, after.velocity_ned_mps) - here.acceleration_ned_mps2).norm() < 1e-5);
+            assert!((slope(before.acceleration_ned_mps2, after.acceleration_ned_mps2) - here.jerk_ned_mps3).norm() < 1e-5);
+            assert!((slope(before.jerk_ned_mps3, after.jerk_ned_mps3) + here.jerk_ned_mps3 / LEAN_S).norm() < 1e-3);
+        }
     }
 }

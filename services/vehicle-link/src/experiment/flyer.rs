@@ -156,9 +156,14 @@ impl Follower {
             home_height_m: config.home_height_m,
             frame: FleetOrigin(Geodetic::from_deg(53.1, -2.9, 40.0)).frame(),
         });
-        for (name, value) in
-            [("PSC_POSXY_P", 1.0), ("PSC_VELXY_P", 2.0), ("PSC_POSZ_P", 1.0), ("PSC_VELZ_P", 5.0), ("ATC_ANG_RLL_P", 4.5), ("ATC_ANG_PIT_P", 4.5)]
-        {
+        for (name, value) in [
+            ("PSC_POSXY_P", 1.0),
+            ("PSC_VELXY_P", 2.0),
+            ("PSC_POSZ_P", 1.0),
+            ("PSC_VELZ_P", 5.0),
+            ("ATC_ANG_RLL_P", 4.5),
+            ("ATC_ANG_PIT_P", 4.5),
+        ] {
             craft.vehicle.handle(
                 LINK,
                 &Inbound::Message(

@@ -14,7 +14,7 @@ mod pilot;
 mod scene;
 mod score;
 
-pub use scene::{Flight, Gnss, Radio, Scenario};
+pub use scene::{Flight, Gnss, Radio, Scenario, WIND_MPS};
 pub use score::{Errors, Report};
 
 use halcyon_model::Stamp;

@@ -53,7 +53,8 @@ impl Pilot {
             self.up = true;
             return;
         }
-        if in_air || self.asked.is_some_and(|at| now.seconds_since(at) < AGAIN_S) || !state.estimator_ok || !state.ready_to_arm {
+        if in_air || self.asked.is_some_and(|at| now.seconds_since(at) < AGAIN_S) || !state.estimator_ok || !state.ready_to_arm
+        {
             return;
         }
         self.asked = Some(now);

@@ -177,11 +177,7 @@ pub(super) struct Channel {
 
 impl Channel {
     pub(super) fn new(scenario: &Scenario) -> Self {
-        Self {
-            radio: scenario.radio,
-            random: SplitMix(scenario.seed),
-            under_way: VecDeque::new(),
-        }
+        Self { radio: scenario.radio, random: SplitMix(scenario.seed), under_way: VecDeque::new() }
     }
 
     pub(super) fn send(&mut self, state: VehicleState, now: Stamp) {

@@ -56,11 +56,7 @@ impl Sums {
 
     fn errors(&self) -> Errors {
         let rms_m = |sum_m2: f64| (sum_m2 / self.samples.max(1) as f64).sqrt();
-        Errors {
-            range_rms_m: rms_m(self.range_m2),
-            slot_rms_m: rms_m(self.slot_m2),
-            altitude_rms_m: rms_m(self.altitude_m2),
-        }
+        Errors { range_rms_m: rms_m(self.range_m2), slot_rms_m: rms_m(self.slot_m2), altitude_rms_m: rms_m(self.altitude_m2) }
     }
 }
 

@@ -30,7 +30,9 @@ mod slot;
 
 use std::collections::BTreeMap;
 
-use halcyon_model::{Activity, FlightMode, LandedState, LocalFrame, LocalPoint, Severity, Slot, Stamp, VehicleId, VehicleState};
+use halcyon_model::{
+    Activity, FlightMode, LandedState, LocalFrame, LocalPoint, Severity, Slot, Stamp, VehicleId, VehicleState,
+};
 use nalgebra::Vector3;
 
 pub use command::Decision;
