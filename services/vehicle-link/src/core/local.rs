@@ -36,7 +36,7 @@ impl LocalFinder {
     pub fn observe(&mut self, message: &MavMessage, datum: &Datum, now: Stamp) {
         match message {
             MavMessage::GLOBAL_POSITION_INT(data) => {
-                self.fleet = fleet_place(data, datum).map(|ned_m| (data.time_boot_ms, ned_m))
+                self.fleet = fleet_place(data, datum).map(|ned_m| (data.time_boot_ms, ned_m));
             }
             MavMessage::LOCAL_POSITION_NED(data) => {
                 let vector = |x: f32, y: f32, z: f32| Vector3::new(f64::from(x), f64::from(y), f64::from(z));

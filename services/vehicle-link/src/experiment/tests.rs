@@ -28,7 +28,8 @@ fn mean(scenario: &Scenario) -> Mean {
     let Scenario { law, flight, slot_m, gnss, gain_scale, separation, .. } = scenario;
     let flight = if matches!(flight, Flight::Square { .. }) { "square" } else { "sweep" };
     println!(
-        "{law:?} | {flight} | {slot_m} m | {gnss:?} | gains × {gain_scale} | filter {separation} | range {:.3} slot {:.3} least {:.2} (mean {:.2}) altitude {:.3}",
+        "{law:?} | {flight} | {slot_m} m | {gnss:?} | gains × {gain_scale} | filter {separation} | \
+         range {:.3} slot {:.3} least {:.2} (mean {:.2}) altitude {:.3}",
         mean.range_m, mean.slot_m, mean.least_m, mean.least_mean_m, mean.altitude_m
     );
     mean
