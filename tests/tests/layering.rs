@@ -23,7 +23,10 @@ const LAYERS: [&[&str]; 6] = [
 ];
 
 /// Crates that may see the simulator: it never lends its truth to what it judges.
-const MAY_SEE_THE_SIMULATOR: [&str; 3] = ["halcyon", "halcyon-capture", "halcyon-tests"];
+const MAY_SEE_THE_SIMULATOR: [&str; 4] = ["halcyon", "halcyon-capture", "halcyon-tests", "halcyon-vehicle-link"];
+
+/// Those of them that may only behind a feature: what flies doesn't carry it.
+const ONLY_BEHIND_A_FEATURE: [&str; 1] = ["halcyon-vehicle-link"];
 
 /// Heavy or worldly dependencies, and the only crates that may have them directly.
 const CONFINED: [(&str, &[&str]); 8] = [
@@ -58,6 +61,9 @@ fn dependencies_point_down_only() {
             }
             if on == "halcyon-sim" && !MAY_SEE_THE_SIMULATOR.contains(&name) {
                 wrong.push(format!("{name} may not use {on}: the simulator does not lend its truth to what it judges"));
+            }
+            if on == "halcyon-sim" && ONLY_BEHIND_A_FEATURE.contains(&name) && !dependency.optional {
+                wrong.push(format!("{name} may use {on} only behind a feature"));
             }
             if let Some((_, allowed)) = CONFINED.iter().find(|(confined, _)| *confined == on)
                 && !allowed.contains(&name)

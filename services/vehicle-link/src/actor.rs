@@ -21,6 +21,8 @@ use crate::io::link::{Link, LinkEvent};
 
 /// Commands that wait for the autopilot's answer at once; more are refused.
 const WAITING_MAX: usize = 16;
+/// However often a leader speaks, guidance steps no more often than this, seconds.
+const STEP_S_MIN: f64 = 0.02;
 
 /// Runs until `context.stop`.
 ///
@@ -54,7 +56,7 @@ pub async fn run(context: Context, config: Config) -> anyhow::Result<()> {
                     PlanAnswer::RefusedOlder { .. } | PlanAnswer::RefusedInvalid(_) => debug!(?answer, "plan refused"),
                 }
             }
-            state = others.recv() => service.executor.observe_neighbour(state?, context.clock.now()),
+            state = others.recv() => service.neighbour(state?, &link).await,
             incoming = commands.recv() => service.command(incoming?).await,
             now = guidance.tick() => service.step(now, &link).await,
             now = publishing.tick() => service.publish(now).await?,
@@ -73,6 +75,7 @@ struct Service<'a> {
     next_ticket: Ticket,
     link_problem: Option<String>,
     published: Option<Stamp>,
+    stepped: Option<Stamp>,
 }
 
 impl<'a> Service<'a> {
@@ -81,6 +84,7 @@ impl<'a> Service<'a> {
             vehicle: vehicle.clone(),
             limits: config.limits.clone(),
             fail_safe: config.fail_safe.clone(),
+            guidance: config.guidance.clone(),
             home_height_m: config.home_height_m,
             frame: context.origin.frame(),
         });
@@ -96,6 +100,7 @@ impl<'a> Service<'a> {
             next_ticket: 1,
             link_problem,
             published: None,
+            stepped: None,
         })
     }
 
@@ -135,8 +140,20 @@ impl<'a> Service<'a> {
         }
     }
 
+    /// Another vehicle's state. The leader's is worth a step at once: waiting for the next tick would be the greatest part of the
+    /// follower's lag.
+    async fn neighbour(&mut self, state: VehicleState, link: &Link) {
+        let now = self.context.clock.now();
+        let leads = self.executor.is_led_by(&state.vehicle);
+        self.executor.observe_neighbour(state, now);
+        if leads && self.stepped.is_none_or(|stepped| now.seconds_since(stepped) >= STEP_S_MIN) {
+            self.step(now, link).await;
+        }
+    }
+
     /// One guidance step, and whatever the command protocol has due.
     async fn step(&mut self, now: Stamp, link: &Link) {
+        self.stepped = Some(now);
         for output in self.executor.step(now) {
             match output {
                 Output::Setpoint(setpoint) => {

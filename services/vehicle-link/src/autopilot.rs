@@ -9,6 +9,7 @@ use crate::config::Config;
 use crate::core::commands::{Command, CommandError, Commands, Effect, Ticket};
 use crate::core::encode::{self, Address, Datum};
 use crate::core::guidance::Setpoint;
+use crate::core::local::LocalFinder;
 use crate::core::streams::Streams;
 use crate::core::telemetry::Telemetry;
 use crate::core::text::Texts;
@@ -37,6 +38,7 @@ pub struct Autopilot {
     wanted: Option<u8>,
     address: Option<Address>,
     datum: Datum,
+    local: LocalFinder,
     telemetry: Telemetry,
     streams: Streams,
     texts: Texts,
@@ -56,6 +58,7 @@ impl Autopilot {
             wanted: (config.system_id != 0).then_some(config.system_id),
             address: None,
             datum: Datum { frame: origin.frame(), home_height_m: config.home_height_m },
+            local: LocalFinder::default(),
             telemetry: Telemetry::new(vehicle, role, origin, config.home_height_m),
             streams: Streams::default(),
             texts: Texts::default(),
@@ -83,6 +86,7 @@ impl Autopilot {
             return heard;
         }
         self.streams.observe(message.message_id(), now);
+        self.local.observe(message, &self.datum, now);
         match message {
             MavMessage::STATUSTEXT(data) => heard.text = self.texts.observe(data, now).map(|text| text.text.clone()),
             MavMessage::COMMAND_ACK(data) => self.commands.observe_ack(data, system, OWN_COMPONENT, now),
@@ -129,6 +133,7 @@ impl Autopilot {
     /// The connection was lost: whoever answers next may be another program, or the autopilot after a restart.
     pub fn link_down(&mut self) -> Vec<Effect> {
         self.address = None;
+        self.local = LocalFinder::default();
         self.streams = Streams::default();
         self.commands.abandon()
     }
@@ -147,7 +152,7 @@ impl Autopilot {
     #[must_use]
     pub fn setpoint(&self, setpoint: &Setpoint, now: Stamp) -> Option<MavMessage> {
         let boot_ms = (now.seconds_since(self.started) * 1e3) as u64 as u32;
-        encode::setpoint(setpoint, &self.datum, self.address?, boot_ms)
+        encode::setpoint(setpoint, &self.datum, self.local.shift_ned_m(now), self.address?, boot_ms)
     }
 
     /// Our header: same system as the vehicle, as its onboard computer.

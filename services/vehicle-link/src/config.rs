@@ -4,6 +4,7 @@ use halcyon_chassis::Section;
 use halcyon_model::{Role, VehicleId};
 use serde::{Deserialize, Serialize};
 
+use crate::core::guidance::Guidance;
 use crate::core::limits::{FailSafeLimits, Limits};
 
 /// One vehicle and the link to its autopilot.
@@ -29,6 +30,8 @@ pub struct Config {
     pub limits: Limits,
     /// When fail-safes act.
     pub fail_safe: FailSafeLimits,
+    /// How slots are kept.
+    pub guidance: Guidance,
 }
 
 impl Default for Config {
@@ -43,6 +46,7 @@ impl Default for Config {
             guidance_rate_hz: 10.0,
             limits: Limits::default(),
             fail_safe: FailSafeLimits::default(),
+            guidance: Guidance::default(),
         }
     }
 }
@@ -78,6 +82,7 @@ impl Section for Config {
         }
         self.limits.validate()?;
         self.fail_safe.validate()?;
+        self.guidance.loops.validate()?;
         let (fence_m, safe_m) = (self.fail_safe.fence_height_m, self.limits.safe_height_m.max(self.limits.return_height_m));
         if fence_m < safe_m + 2.0 {
             return Err(format!(

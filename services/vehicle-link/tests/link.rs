@@ -84,7 +84,7 @@ async fn finds_it_and_publishes(peer: Peer, scheme: &str) {
     assert!(state.position_ned_m.norm() < 0.1, "{}", state.position_ned_m);
     assert!((state.heading_rad - 0.5).abs() < 1e-6);
     assert!(!state.armed && !state.estimator_ok && !state.ready_to_arm && state.battery_fraction.is_none());
-    rig.wait(|peer| peer.sent(asks_for_streams) >= 9).await;
+    rig.wait(|peer| peer.sent(asks_for_streams) >= 10).await;
     rig.wait(|peer| peer.sent(|message| matches!(message, MavMessage::HEARTBEAT(_))) >= 2).await;
     let frames = rig.peer.shared.frames.lock().unwrap().clone();
     for (header, message) in &frames {
@@ -116,7 +116,7 @@ async fn commands_are_answered_with_the_autopilots_words() {
     let reply = rig.call(VehicleAction::Return).await;
     assert!(!reply.accepted && reply.reason.contains("on the ground"), "{reply:?}");
     // The first try is not heard; the second is.
-    rig.wait(|peer| peer.sent(asks_for_streams) >= 9).await;
+    rig.wait(|peer| peer.sent(asks_for_streams) >= 10).await;
     rig.peer.shared.deaf_once.store(true, Ordering::Relaxed);
     let reply = rig.call(VehicleAction::SetMode(FlightMode::Guided)).await;
     assert!(reply.accepted, "{reply:?}");

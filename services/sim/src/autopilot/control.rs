@@ -229,7 +229,8 @@ impl Controller {
             Horizontal::Lean { .. } => return,
         };
         let wanted_mps = capped(wanted_mps, limits.speed_mps);
-        let wanted_mps2 = capped((wanted_mps - velocity_mps) * SHAPE_PER_S + feed_mps2, accel_max_mps2);
+        // As ArduCopter's shape_vel_accel_xy in GUIDED: the correction is limited, what is fed forward comes on top of it.
+        let wanted_mps2 = capped((wanted_mps - velocity_mps) * SHAPE_PER_S, accel_max_mps2) + feed_mps2;
         let acceleration_mps2 = self.acceleration_mps2.xy();
         let acceleration_mps2 = acceleration_mps2 + capped(wanted_mps2 - acceleration_mps2, JERK_MPS3 * dt_s);
         let velocity_mps = velocity_mps + acceleration_mps2 * dt_s;

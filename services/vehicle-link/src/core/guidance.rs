@@ -3,20 +3,25 @@
 //! The slot is given in the leader's heading frame (forward, right, up); line abreast at separation S is the thesis's
 //! (6-1 … 6-8), without its singularity at 90° and 270° since the frame is rotated, not solved for.
 
-use nalgebra::{Rotation3, Vector3};
+use nalgebra::Vector3;
 
 use halcyon_model::Slot;
+use serde::{Deserialize, Serialize};
 
+use super::inverse::Loops;
+use super::law::{Law, SlotLock};
 use super::limits::Limits;
 use super::track::Motion;
 
-/// What the autopilot is asked to follow: position with velocity feed-forward, in the fleet's local frame.
+/// What the autopilot is asked to follow: position with velocity and acceleration feed-forward, in the fleet's local frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Setpoint {
     /// Position, metres north, east, down of the fleet's origin.
     pub position_ned_m: Vector3<f64>,
     /// Velocity feed-forward, metres per second.
     pub velocity_ned_mps: Vector3<f64>,
+    /// Acceleration feed-forward, metres per second squared; `None` leaves it to the autopilot.
+    pub acceleration_ned_mps2: Option<Vector3<f64>>,
     /// Heading, radians clockwise from north; `None` leaves it.
     pub heading_rad: Option<f64>,
 }
@@ -29,15 +34,32 @@ impl Setpoint {
     }
 }
 
-/// Where the slot is and how it moves: the leader's velocity plus the slot's swing when the leader turns.
+/// How slots are kept (`[vehicle_link.guidance]`).
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Guidance {
+    /// The law: `halcyon`, or for comparison `thesis_quadratic`, `position_only`, `position_velocity`,
+    /// `position_velocity_acceleration`.
+    pub law: Law,
+    /// What slots turn with: `heading` (the leader's; forward is where it looks) or `north` (nothing; forward is north).
+    pub slot_lock: SlotLock,
+    /// What is believed of this vehicle's autopilot.
+    pub loops: Loops,
+}
+
+/// Where the slot is and how it moves: the leader's motion plus, when the leader turns, the slot's swing ω × r, its centripetal
+/// acceleration ω × (ω × r) and the jerk of that. The change of the turn rate is not known and left out.
 #[must_use]
 pub fn slot_motion(leader: &Motion, slot: &Slot) -> Motion {
-    let ned_from_heading = Rotation3::from_axis_angle(&Vector3::z_axis(), leader.heading_rad);
-    let offset_ned_m = ned_from_heading * Vector3::new(slot.forward_m, slot.right_m, -slot.up_m);
-    let swing_ned_mps = Vector3::new(0.0, 0.0, leader.yaw_rate_radps).cross(&offset_ned_m);
+    let offset_ned_m = super::law::offset_ned_m(slot, leader.heading_rad);
+    let turn_radps = Vector3::new(0.0, 0.0, leader.yaw_rate_radps);
+    let swing_ned_mps = turn_radps.cross(&offset_ned_m);
+    let inward_ned_mps2 = turn_radps.cross(&swing_ned_mps);
     Motion {
         position_ned_m: leader.position_ned_m + offset_ned_m,
         velocity_ned_mps: leader.velocity_ned_mps + swing_ned_mps,
+        acceleration_ned_mps2: leader.acceleration_ned_mps2 + inward_ned_mps2,
+        jerk_ned_mps3: leader.jerk_ned_mps3 + turn_radps.cross(&inward_ned_mps2),
         ..*leader
     }
 }
@@ -138,6 +160,8 @@ mod tests {
         Motion {
             position_ned_m: Vector3::new(10.0, -4.0, -6.0),
             velocity_ned_mps: Vector3::new(1.0, 0.5, -0.1),
+            acceleration_ned_mps2: Vector3::zeros(),
+            jerk_ned_mps3: Vector3::zeros(),
             heading_rad,
             yaw_rate_radps: 0.3,
         }
@@ -174,6 +198,8 @@ mod tests {
                 let leader = Motion {
                     position_ned_m: Vector3::new(2.0, 1.0, -5.0) * t,
                     velocity_ned_mps: Vector3::new(2.0, 1.0, -5.0),
+                    acceleration_ned_mps2: Vector3::zeros(),
+                    jerk_ned_mps3: Vector3::zeros(),
                     heading_rad: heading + rate * t,
                     yaw_rate_radps: rate,
                 };
@@ -182,6 +208,24 @@ mod tests {
             let h = 1e-5;
             let numeric = (at(h).position_ned_m - at(-h).position_ned_m) / (2.0 * h);
             prop_assert!((numeric - at(0.0).velocity_ned_mps).norm() < 1e-6);
+            // Each derivative is that of the one before it, through every heading.
+            let numeric = (at(h).velocity_ned_mps - at(-h).velocity_ned_mps) / (2.0 * h);
+            prop_assert!((numeric - at(0.0).acceleration_ned_mps2).norm() < 1e-6);
+            let numeric = (at(h).acceleration_ned_mps2 - at(-h).acceleration_ned_mps2) / (2.0 * h);
+            prop_assert!((numeric - at(0.0).jerk_ned_mps3).norm() < 1e-6);
+        }
+    }
+
+    /// A slot that swings round a standing leader flies a circle: v²/r, towards the leader.
+    #[test]
+    fn a_turning_leaders_slot_is_drawn_inwards_by_v_squared_over_r() {
+        for heading_deg in [0.0f64, 89.9, 90.0, 180.0, 270.0, 359.9] {
+            let standing = Motion { velocity_ned_mps: Vector3::zeros(), ..leader(heading_deg.to_radians()) };
+            let slot = slot_motion(&standing, &Slot { forward_m: 3.0, right_m: -4.0, up_m: 0.0 });
+            let speed_mps = slot.velocity_ned_mps.norm();
+            assert_relative_eq!(speed_mps, 0.3 * 5.0, epsilon = 1e-12);
+            let inward = (standing.position_ned_m - slot.position_ned_m) / 5.0;
+            assert_relative_eq!(slot.acceleration_ned_mps2, inward * (speed_mps * speed_mps / 5.0), epsilon = 1e-12);
         }
     }
 

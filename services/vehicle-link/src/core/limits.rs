@@ -30,9 +30,11 @@ pub struct Limits {
     pub follow_acceleration_mps2: f64,
     /// Least distance to every flying vehicle, metres; at least 5 (thesis §6.8).
     pub separation_m_min: f64,
-    /// Distance kept on top of `separation_m_min` for control lag and position noise, metres. A slot nearer than both together is
-    /// kept at their sum.
+    /// Distance kept on top of `separation_m_min` for control lag and position noise, metres.
     pub separation_margin_m: f64,
+    /// Within a formation the distance kept is at most this much less than the one that the plan has two vehicles at, metres: else
+    /// a slot at the least separation itself could not be taken.
+    pub slot_slack_m: f64,
     /// Least distance to a vehicle that stands disarmed, metres: it can't move, and homes lie close together.
     pub separation_parked_m: f64,
     /// Within this distance of a place it counts as reached, metres.
@@ -67,6 +69,7 @@ impl Default for Limits {
             follow_acceleration_mps2: 3.0,
             separation_m_min: 5.0,
             separation_margin_m: 1.0,
+            slot_slack_m: 0.75,
             separation_parked_m: 3.0,
             settle_radius_m: 1.0,
             settle_s: 2.0,
@@ -103,6 +106,7 @@ impl Limits {
         ];
         check_each(&positive, "limits", |value| value > 0.0, "above 0")?;
         let not_negative = [("separation_margin_m", self.separation_margin_m), ("latency_s", self.latency_s)];
+        check_each(&[("slot_slack_m", self.slot_slack_m)], "limits", |value| (0.0..=2.0).contains(&value), "in 0 to 2")?;
         check_each(&not_negative, "limits", |value| value >= 0.0, "0 or more")?;
         check_each(&[("separation_m_min", self.separation_m_min)], "limits", |value| value >= 5.0, "at least 5")?;
         check_each(&[("descent_mps", self.descent_mps)], "limits", |value| value <= 0.5, "at most 0.5")?;

@@ -5,6 +5,8 @@ use std::f64::consts::PI;
 use halcyon_model::{FlightMode, Stamp, VehicleState};
 use nalgebra::Vector3;
 
+use super::observer::{LEAN_S, Observer};
+
 /// Time constant of the acceleration and yaw-rate filters, seconds: long enough to calm 10 Hz differences.
 const FILTER_S: f64 = 0.3;
 /// Differences are believed up to these; beyond them is a jump, not a motion.
@@ -15,7 +17,11 @@ const PREDICTION_S_MAX: f64 = 1.0;
 /// A stamp this far ahead of the present is an error of its clock, and does not keep newer states out, seconds.
 const AHEAD_S_MAX: f64 = 2.0;
 
-/// Another vehicle's newest state, with what two of them tell: acceleration and yaw rate.
+/// Nothing that flies is further from the fleet's origin, metres, or faster, metres per second.
+const PLACE_M_MAX: f64 = 1e5;
+const SPEED_MPS_MAX: f64 = 100.0;
+
+/// Another vehicle's newest state, with what several of them tell: acceleration and yaw rate.
 #[derive(Debug, Clone)]
 pub struct Track {
     /// The newest state by its own stamp.
@@ -24,6 +30,8 @@ pub struct Track {
     pub received: Stamp,
     /// When the vehicle last said anything, the same again included.
     heard: Stamp,
+    observer: Observer,
+    /// By filtered differences: what the plain law goes by.
     acceleration_ned_mps2: Vector3<f64>,
     yaw_rate_radps: f64,
 }
@@ -35,6 +43,10 @@ pub struct Motion {
     pub position_ned_m: Vector3<f64>,
     /// Velocity, metres per second.
     pub velocity_ned_mps: Vector3<f64>,
+    /// Acceleration, metres per second squared.
+    pub acceleration_ned_mps2: Vector3<f64>,
+    /// Jerk, metres per second cubed.
+    pub jerk_ned_mps3: Vector3<f64>,
     /// Heading, radians clockwise from north.
     pub heading_rad: f64,
     /// Rate of the heading, radians per second.
@@ -45,7 +57,18 @@ impl Track {
     /// From a first state.
     #[must_use]
     pub fn new(state: VehicleState, now: Stamp) -> Self {
-        Self { state, received: now, heard: now, acceleration_ned_mps2: Vector3::zeros(), yaw_rate_radps: 0.0 }
+        let observer = Observer::new(&state);
+        Self { state, received: now, heard: now, observer, acceleration_ned_mps2: Vector3::zeros(), yaw_rate_radps: 0.0 }
+    }
+
+    /// Whether a state can be that of a vehicle at all: what isn't is not taken, so that it never reaches a setpoint.
+    #[must_use]
+    pub fn believable(state: &VehicleState) -> bool {
+        // NaN is never within.
+        state.position_ned_m.norm() <= PLACE_M_MAX
+            && state.velocity_ned_mps.norm() <= SPEED_MPS_MAX
+            && state.heading_rad.is_finite()
+            && (state.ned_from_body.norm() - 1.0).abs() < 1e-3
     }
 
     /// Takes a newer state. An older one by its stamp changes nothing; the same again, from a vehicle that no longer hears its
@@ -70,7 +93,9 @@ impl Track {
             if yaw_rate.abs() <= YAW_RATE_RADPS_MAX {
                 self.yaw_rate_radps += gain * (yaw_rate - self.yaw_rate_radps);
             }
+            self.observer.observe(&state, dt_s);
         } else {
+            self.observer = Observer::new(&state);
             self.acceleration_ned_mps2 = Vector3::zeros();
             self.yaw_rate_radps = 0.0;
         }
@@ -91,18 +116,52 @@ impl Track {
         now.seconds_since(self.state.stamp).max(now.seconds_since(self.received)).max(0.0)
     }
 
-    /// Predicted `ahead_s` after `now` with constant acceleration and yaw rate, at most one second from the stamp.
+    /// Predicted `ahead_s` after `now`, at most one second from the stamp: its acceleration goes on, its jerk dies away as a lean
+    /// settles, its turn goes on.
     #[must_use]
     pub fn predict(&self, now: Stamp, ahead_s: f64) -> Motion {
-        let dt_s = (now.seconds_since(self.state.stamp) + ahead_s).clamp(0.0, PREDICTION_S_MAX);
-        let velocity_ned_mps = self.state.velocity_ned_mps + self.acceleration_ned_mps2 * dt_s;
+        let jerk_ned_mps3 = self.observer.jerk_ned_mps3();
+        self.carried_on(
+            self.age_s(now, ahead_s),
+            self.observer.acceleration_ned_mps2(),
+            jerk_ned_mps3,
+            self.observer.yaw_rate_radps(),
+        )
+    }
+
+    /// The same with the acceleration and the yaw rate that filtered differences give, for the plain law.
+    #[must_use]
+    pub fn predict_by_differences(&self, now: Stamp, ahead_s: f64) -> Motion {
+        self.carried_on(self.age_s(now, ahead_s), self.acceleration_ned_mps2, Vector3::zeros(), self.yaw_rate_radps)
+    }
+
+    /// As it was at its stamp, for laws that don't predict.
+    #[must_use]
+    pub fn as_heard(&self) -> Motion {
+        self.carried_on(0.0, self.acceleration_ned_mps2, Vector3::zeros(), self.yaw_rate_radps)
+    }
+
+    fn age_s(&self, now: Stamp, ahead_s: f64) -> f64 {
+        (now.seconds_since(self.state.stamp) + ahead_s).clamp(0.0, PREDICTION_S_MAX)
+    }
+
+    fn carried_on(&self, dt_s: f64, acceleration: Vector3<f64>, jerk: Vector3<f64>, yaw_rate_radps: f64) -> Motion {
+        let left = (-dt_s / LEAN_S).exp();
+        // Integrals of e^(−t/T): once, twice, three times.
+        let once_s = LEAN_S * (1.0 - left);
+        let twice_s2 = LEAN_S * (dt_s - once_s);
+        let thrice_s3 = LEAN_S * (0.5 * dt_s * dt_s - twice_s2);
+        let state = &self.state;
         Motion {
-            position_ned_m: self.state.position_ned_m
-                + self.state.velocity_ned_mps * dt_s
-                + 0.5 * dt_s * dt_s * self.acceleration_ned_mps2,
-            velocity_ned_mps,
-            heading_rad: (self.state.heading_rad + self.yaw_rate_radps * dt_s).rem_euclid(2.0 * PI),
-            yaw_rate_radps: self.yaw_rate_radps,
+            position_ned_m: state.position_ned_m
+                + state.velocity_ned_mps * dt_s
+                + acceleration * (0.5 * dt_s * dt_s)
+                + jerk * thrice_s3,
+            velocity_ned_mps: state.velocity_ned_mps + acceleration * dt_s + jerk * twice_s2,
+            acceleration_ned_mps2: acceleration + jerk * once_s,
+            jerk_ned_mps3: jerk * left,
+            heading_rad: (state.heading_rad + yaw_rate_radps * dt_s).rem_euclid(2.0 * PI),
+            yaw_rate_radps,
         }
     }
 
@@ -127,17 +186,17 @@ pub fn wrap_rad(angle_rad: f64) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use halcyon_model::{Activity, Geodetic, LandedState, Role, VehicleId};
     use nalgebra::UnitQuaternion;
 
     use super::*;
 
-    fn t(s: f64) -> Stamp {
+    pub(in crate::core) fn t(s: f64) -> Stamp {
         Stamp::from_secs_f64(1000.0).plus_secs_f64(s)
     }
 
-    fn state(stamp: Stamp, north_m: f64) -> VehicleState {
+    pub(in crate::core) fn state(stamp: Stamp, north_m: f64) -> VehicleState {
         VehicleState {
             stamp,
             vehicle: VehicleId::new("other").unwrap(),
@@ -186,5 +245,31 @@ mod tests {
         // An ordinary late one is still no news.
         track.observe(state(t(1.0), 9.0), t(1.2));
         assert_eq!(track.state.position_ned_m.x, 4.1);
+    }
+
+    /// The prediction is the solution of its own differential equation: each derivative is that of the one before it, and the jerk
+    /// dies away with the lean's time constant.
+    #[test]
+    fn a_prediction_is_consistent() {
+        let mut track = Track::new(state(t(0.0), 0.0), t(0.0));
+        for step in 1..=5u32 {
+            let time_s = 0.1 * f64::from(step);
+            let leaning = VehicleState {
+                velocity_ned_mps: Vector3::new(2.0 * time_s * time_s, 0.3 * time_s, 0.0),
+                ned_from_body: UnitQuaternion::from_euler_angles(0.1 * time_s, -0.4 * time_s, 0.0),
+                ..state(t(time_s), 0.5 * time_s)
+            };
+            track.observe(leaning, t(time_s));
+        }
+        let h = 1e-4;
+        for ahead_s in [0.1, 0.3, 0.6] {
+            let at = |shift_s: f64| track.predict(t(0.5), ahead_s + shift_s);
+            let (before, here, after) = (at(-h), at(0.0), at(h));
+            let slope = |a: Vector3<f64>, b: Vector3<f64>| (b - a) / (2.0 * h);
+            assert!((slope(before.position_ned_m, after.position_ned_m) - here.velocity_ned_mps).norm() < 1e-5);
+            assert!((slope(before.velocity_ned_mps, after.velocity_ned_mps) - here.acceleration_ned_mps2).norm() < 1e-5);
+            assert!((slope(before.acceleration_ned_mps2, after.acceleration_ned_mps2) - here.jerk_ned_mps3).norm() < 1e-5);
+            assert!((slope(before.jerk_ned_mps3, after.jerk_ned_mps3) + here.jerk_ned_mps3 / LEAN_S).norm() < 1e-3);
+        }
     }
 }

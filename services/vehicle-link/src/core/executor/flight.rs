@@ -1,13 +1,14 @@
 //! In the air: fail-safes first, then the goal, then one setpoint through the separation filter.
 
-use halcyon_model::{Activity, FlightMode, LocalPoint, Slot, Stamp, VehicleId, VehicleState};
+use halcyon_model::{Activity, FlightMode, LocalPoint, Stamp, VehicleState};
 use nalgebra::Vector3;
 
 use super::{Executor, Goal, Output};
 use crate::core::commands::Command;
 use crate::core::failsafe::{Action, Alarm, Cause, Conditions, PlanHealth};
-use crate::core::guidance::{PLACE_GAIN_HZ, Reference, SLOT_GAIN_HZ, Setpoint, Target, limit_velocity, slot_motion};
+use crate::core::guidance::{PLACE_GAIN_HZ, Reference, SLOT_GAIN_HZ, Setpoint, Target, limit_velocity};
 use crate::core::interlock;
+use crate::core::inverse::Inverse;
 use crate::core::separation;
 
 /// The autopilot's own climb is waited for so long, seconds; then guidance takes over.
@@ -17,7 +18,7 @@ const CLIMBED_MPS: f64 = 0.5;
 /// Nearer than this to its place a vehicle may go to the place's own height, and counts as there, metres.
 const NEAR_M: f64 = 3.0;
 /// Lower than the floor by more than this, a vehicle climbs before it goes anywhere, metres.
-const LOW_M: f64 = 0.7;
+pub(super) const LOW_M: f64 = 0.7;
 /// Setpoints end this far inside the fence, metres.
 const FENCE_INSIDE_M: f64 = 2.0;
 
@@ -80,6 +81,8 @@ impl Executor {
             self.settle.reset();
             self.descending = false;
             self.held = None;
+            self.left_slot();
+            self.inverse = Inverse::default();
         }
         self.flying = Some(effective.clone());
         let mut step = Step { own, here_ned_m, dt_s, now, outputs };
@@ -175,32 +178,6 @@ impl Executor {
         }
     }
 
-    fn follow(&mut self, leader: &VehicleId, slot: &Slot, step: &mut Step) {
-        let Some(track) = self.neighbours.get(leader) else {
-            // The interlock has refused this already; hold all the same.
-            self.hold(None, step);
-            return self.set(Activity::Following { settled: false, slot_error_m: f64::MAX }, "leader unknown");
-        };
-        let limits = &self.config.limits;
-        let present = slot_motion(&track.predict(step.now, 0.0), slot);
-        let ahead = slot_motion(&track.predict(step.now, limits.latency_s), slot);
-        let silent_s = track.silent_s(step.now);
-        let (floor_m, radius_m, settle_s) = (limits.safe_height_m, limits.settle_radius_m, limits.settle_s);
-        let above_floor = |place: Vector3<f64>| Vector3::new(place.x, place.y, place.z.min(-floor_m));
-        let slot_error_m = (above_floor(present.position_ned_m) - step.here_ned_m).norm();
-        if silent_s > self.config.fail_safe.leader_predict_s {
-            self.hold(None, step);
-            self.settle.reset();
-            let detail = format!("leader silent for {silent_s:.1} s, holding");
-            return self.set(Activity::Following { settled: false, slot_error_m }, detail);
-        }
-        self.held = None;
-        // The thesis's second condition: the same heading as the leader's.
-        self.drive(above_floor(ahead.position_ned_m), ahead.velocity_ned_mps, Some(ahead.heading_rad), floor_m, step);
-        let settled = self.settle.step(slot_error_m, radius_m, settle_s, step.now);
-        self.set(Activity::Following { settled, slot_error_m }, "");
-    }
-
     /// Moves the reference towards a place and sends it: never below `floor_m`, never outside the fence, never too near to
     /// anyone. Low, it climbs before it goes sideways.
     pub(super) fn drive(
@@ -227,17 +204,23 @@ impl Executor {
             target.velocity_ned_mps = Vector3::zeros();
         }
         let wanted = reference.wanted_mps(&target, limits, step.dt_s);
-        let obstacle = |track| separation::obstacle(track, follows, limits, step.now);
-        let obstacles: Vec<_> = self.neighbours.values().filter_map(obstacle).collect();
+        let obstacles = self.obstacles(step.now);
         let points = [step.here_ned_m, reference.position_ned_m];
         let mut velocity = separation::filter(wanted, points, target.position_ned_m, &obstacles, limits);
         limit_velocity(&mut velocity, limits, limits.descent_mps);
         reference.advance(velocity, step.here_ned_m, step.dt_s);
+        let Reference { position_ned_m, velocity_ned_mps } = self.bounded(reference, floor_m, step);
+        let setpoint = Setpoint { position_ned_m, velocity_ned_mps, acceleration_ned_mps2: None, heading_rad };
+        step.outputs.push(Output::Setpoint(setpoint));
+    }
 
+    /// Keeps the reference above the floor and inside the fence, and remembers it.
+    pub(super) fn bounded(&mut self, mut reference: Reference, floor_m: f64, step: &Step) -> Reference {
         if reference.position_ned_m.z > -floor_m {
             reference.position_ned_m.z = -floor_m;
             let climbing = step.height_m() < floor_m - 0.3;
-            reference.velocity_ned_mps.z = if climbing { -limits.climb_mps } else { reference.velocity_ned_mps.z.min(0.0) };
+            let climb_mps = self.config.limits.climb_mps;
+            reference.velocity_ned_mps.z = if climbing { -climb_mps } else { reference.velocity_ned_mps.z.min(0.0) };
         }
         let ceiling_m = self.config.fail_safe.fence_height_m - FENCE_INSIDE_M;
         if reference.position_ned_m.z < -ceiling_m {
@@ -253,7 +236,6 @@ impl Executor {
             reference.velocity_ned_mps.y = 0.0;
         }
         self.reference = Some(reference);
-        let Reference { position_ned_m, velocity_ned_mps } = reference;
-        step.outputs.push(Output::Setpoint(Setpoint { position_ned_m, velocity_ned_mps, heading_rad }));
+        reference
     }
 }

@@ -1,6 +1,8 @@
 //! Taking in plans.
 
-use halcyon_model::{DispatchPlan, Severity, Stamp};
+use std::collections::BTreeMap;
+
+use halcyon_model::{DispatchPlan, Severity, Slot, Stamp, Task, VehicleId};
 
 use super::{Executor, Goal, PlanSeen};
 use crate::core::interlock;
@@ -45,6 +47,7 @@ impl Executor {
             self.note(Severity::Warning, format!("plan {} refused", plan.generation), problem.clone());
             return PlanAnswer::RefusedInvalid(problem);
         }
+        self.formation = formation(plan);
         let valid_until = latest(plan.valid_until);
         self.plan = Some(PlanSeen { generation: plan.generation, valid_until, assigned: goal.is_some() });
         if let Some(goal) = goal {
@@ -84,4 +87,13 @@ impl Executor {
         }
         None
     }
+}
+
+/// Who follows whom where.
+fn formation(plan: &DispatchPlan) -> BTreeMap<VehicleId, (VehicleId, Slot)> {
+    let followers = plan.assignments.iter().filter_map(|assignment| match &assignment.task {
+        Task::Follow { leader, slot } => Some((assignment.vehicle.clone(), (leader.clone(), *slot))),
+        _ => None,
+    });
+    followers.collect()
 }

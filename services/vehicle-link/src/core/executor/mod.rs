@@ -26,10 +26,13 @@ mod goal;
 mod ground;
 mod intake;
 mod settle;
+mod slot;
 
 use std::collections::BTreeMap;
 
-use halcyon_model::{Activity, FlightMode, LandedState, LocalFrame, LocalPoint, Severity, Stamp, VehicleId, VehicleState};
+use halcyon_model::{
+    Activity, FlightMode, LandedState, LocalFrame, LocalPoint, Severity, Slot, Stamp, VehicleId, VehicleState,
+};
 use nalgebra::Vector3;
 
 pub use command::Decision;
@@ -39,8 +42,9 @@ pub use intake::PlanAnswer;
 use super::commands::{Command, CommandError};
 use super::control::{Change, Control};
 use super::failsafe::{FailSafes, PlanHealth};
-use super::guidance::{Reference, Setpoint};
+use super::guidance::{Guidance, Reference, Setpoint};
 use super::interlock::mode_name;
+use super::inverse::Inverse;
 use super::limits::{FailSafeLimits, Limits};
 use super::track::Track;
 use settle::Settle;
@@ -61,6 +65,8 @@ pub struct ExecutorConfig {
     pub limits: Limits,
     /// When fail-safes act.
     pub fail_safe: FailSafeLimits,
+    /// How slots are kept.
+    pub guidance: Guidance,
     /// Height of home above mean water, metres.
     pub home_height_m: f64,
     /// The fleet's frame.
@@ -147,6 +153,11 @@ pub struct Executor {
     flown: Option<Goal>,
     airborne: bool,
     reference: Option<Reference>,
+    /// What is left between the reference and the slot that it has joined, metres.
+    slot_left_m: Option<Vector3<f64>>,
+    inverse: Inverse,
+    /// Who follows whom where, by the newest plan.
+    formation: BTreeMap<VehicleId, (VehicleId, Slot)>,
     held: Option<Vector3<f64>>,
     settle: Settle,
     descending: bool,
@@ -186,6 +197,9 @@ impl Executor {
             flown: None,
             airborne: false,
             reference: None,
+            slot_left_m: None,
+            inverse: Inverse::default(),
+            formation: BTreeMap::new(),
             held: None,
             settle: Settle::default(),
             descending: false,
@@ -235,9 +249,15 @@ impl Executor {
         state.touchdown = self.touchdown;
     }
 
+    /// Whether this vehicle keeps a slot beside `other` now: news of it is worth a step at once.
+    #[must_use]
+    pub fn is_led_by(&self, other: &VehicleId) -> bool {
+        matches!(&self.flying, Some(Goal::Follow { leader, .. }) if leader == other)
+    }
+
     /// Another vehicle's state.
     pub fn observe_neighbour(&mut self, state: VehicleState, now: Stamp) {
-        if state.vehicle == self.config.vehicle {
+        if state.vehicle == self.config.vehicle || !Track::believable(&state) {
             return;
         }
         if let Some(track) = self.neighbours.get_mut(&state.vehicle) {
@@ -406,6 +426,8 @@ impl Executor {
     /// Forgets what guidance was doing, so that it starts smoothly from where the vehicle then is.
     fn let_go(&mut self) {
         self.reference = None;
+        self.left_slot();
+        self.inverse = Inverse::default();
         self.flying = None;
         self.held = None;
         self.climb = None;

@@ -3,5 +3,6 @@
 mod commands;
 mod failsafes;
 mod flights;
+mod formation;
 mod properties;
 mod world;

@@ -8,7 +8,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::core::commands::Command;
 use crate::core::executor::{Decision, Executor, ExecutorConfig, Note, Output, PlanAnswer};
-use crate::core::guidance::Setpoint;
+use crate::core::guidance::{Guidance, Setpoint};
 use crate::core::limits::{FailSafeLimits, Limits};
 
 pub(super) const DT_S: f64 = 0.1;
@@ -162,6 +162,7 @@ pub(super) fn config(name: &str) -> ExecutorConfig {
         vehicle: id(name),
         limits: Limits::default(),
         fail_safe: FailSafeLimits::default(),
+        guidance: Guidance::default(),
         home_height_m: 0.0,
         frame: origin().frame(),
     }
