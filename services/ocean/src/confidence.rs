@@ -34,7 +34,8 @@ pub fn variance_factors_95(dof: f64) -> (f64, f64) {
 /// Probability that a standard normal variable is under `z`; NaN for NaN.
 #[must_use]
 pub fn normal_cumulative(z: f64) -> f64 {
-    // z² is chi-square with one degree of freedom.
+    // Further out it is 0 or 1 to the last digit. z² is chi-square with one degree of freedom.
+    let z = z.clamp(-40.0, 40.0);
     let within = gamma_p(0.5, 0.5 * z * z);
     if z < 0.0 { 0.5 * (1.0 - within) } else { 0.5 * (1.0 + within) }
 }
