@@ -18,9 +18,9 @@ use crate::welch::{SampledSpectrum, SpectralStatistics, Welch};
 pub type Interval = (f64, f64);
 
 /// Degrees of freedom come from the same record as the variance: when it is low by chance, they are high. So much of them is claimed.
-const CLAIMED: f64 = 0.85;
+pub(crate) const CLAIMED: f64 = 0.85;
 /// Two-sided 95 % of the normal distribution.
-const NORMAL_95: f64 = 1.959_964;
+pub(crate) const NORMAL_95: f64 = 1.959_964;
 /// Redrawn records; the ends of an interval are then known to a tenth of its width.
 const DRAWS: usize = 400;
 /// Waves in a group, at most. Correlation of successive heights is about 0.2 to 0.4 in wind seas, and lasts for a few waves: groups must be
@@ -104,7 +104,7 @@ impl WaveIntervals {
 }
 
 /// Two-sided 95 % of Student's distribution: Cornish and Fisher's expansion, good to a percent from four degrees of freedom on.
-fn student_95(freedom: f64) -> f64 {
+pub(crate) fn student_95(freedom: f64) -> f64 {
     NORMAL_95 + 2.372_27 / freedom + 2.822_5 / freedom.powi(2) + 2.555_8 / freedom.powi(3)
 }
 

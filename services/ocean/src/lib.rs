@@ -17,6 +17,7 @@
 //! | [`forecast`] | the sea some seconds ahead at a spot, with its errors, and its quiet moments |
 //! | [`space`] | length, direction and spread of waves from a film of the surface |
 //! | [`shape`] | what a spectrum says beyond moments: its scatter, peak, noise, wave systems, fits of JONSWAP and Pierson-Moskowitz |
+//! | [`witness`] | a second sensor beside the elevation: lag, regression, coherence, and whether the two agree |
 //! | [`filter`], [`spline`] | splitting a record by frequency; uneven samples to even ones |
 //!
 //! Elevation is positive up, metres; densities are one-sided, m²/Hz.
@@ -35,13 +36,14 @@ pub mod interval;
 pub mod outlier;
 pub mod quality;
 pub mod record;
-pub mod space;
 pub mod shape;
+pub mod space;
 mod special;
 pub mod spectrum;
 pub mod spline;
 pub mod spreading;
 pub mod welch;
+pub mod witness;
 
 pub use crossing::{Crossing, Wave, WaveStatistics};
 pub use dispersion::{Depth, GRAVITY_MPS2};
