@@ -183,7 +183,7 @@ pub fn compare(a: &RawSeries<'_>, b: &RawSeries<'_>, options: &Options) -> Resul
         bias_m,
         rmse_m,
         band_hz,
-        at_peak: spectra.coarse.at_peak(band_hz),
+        at_peak: spectra.coarse.at_peak(band_hz, noise_density[1]),
         a: seen_a?,
         b: seen_b?,
         height_ratio: both.heights(options.scale_95),
