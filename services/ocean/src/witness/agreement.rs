@@ -37,6 +37,11 @@ pub enum Difference {
         /// The witness.
         b_s: Interval,
     },
+    /// One has its sign wrong.
+    UpsideDown {
+        /// The lowest correlation within the lags looked through.
+        correlation: f64,
+    },
     /// One has waves that the other should see above its noise, and does not.
     WavesInOne {
         /// The one that has.
@@ -127,6 +132,7 @@ pub fn agreement(comparison: &Comparison) -> Verdict {
         return Verdict::Disagree { why: vec![lone] };
     }
     let mut why = Vec::new();
+    why.extend(comparison.upside_down.map(|correlation| Difference::UpsideDown { correlation }));
     why.extend(comparison.height_ratio.filter(|ratio| !ratio.is_one()).map(Difference::Height));
     why.extend(comparison.period_ratio.filter(|ratio| !ratio.is_one()).map(Difference::Period));
     let (a_s, b_s) = (a.t_p_95_s, b.t_p_95_s);

@@ -1,17 +1,15 @@
 //! Two series of the same water, compared in time, in frequency and by regression.
 
 use super::align::{Pair, SAMPLES_MIN, ordered, span_s};
-use super::cross::{AtPeak, CrossSpectrum};
+use super::cross::AtPeak;
 use super::lag;
-use super::ratio::{Both, Moments, Ratio};
+use super::ratio::Ratio;
 use super::regression::Regression;
+use super::spectra::Spectra;
 use super::{CompareError, Which};
-use crate::crossing::{Crossing, Wave, WaveStatistics, waves};
-use crate::interval::{Interval, SpectralIntervals, WaveIntervals};
+use crate::crossing::WaveStatistics;
+use crate::interval::{Interval, WaveIntervals};
 use crate::quality::series::RawSeries;
-use crate::record::Record;
-use crate::shape::peak::PeakPeriods;
-use crate::welch::SampledSpectrum;
 
 /// How two series are compared.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -88,6 +86,9 @@ pub struct Comparison {
     /// How much later b comes, seconds; `None` where the two do not correlate beyond chance (four deviations of what unrelated seas give) or
     /// the highest correlation is at an end of the search: then they are compared as their stamps are.
     pub lag_s: Option<f64>,
+    /// The lowest correlation of the search where it is clearly stronger than the highest, beyond chance: one of the two has its sign
+    /// wrong, as a range taken for an elevation. No lag is taken then.
+    pub upside_down: Option<f64>,
     /// Pearson's correlation after the lag.
     pub correlation: f64,
     /// a on b.
@@ -112,6 +113,8 @@ pub struct Comparison {
 
 /// Resampling and clocks leave this share of a period open, with 95 %.
 const PERIOD_SCALE_95: f64 = 0.01;
+/// By how much a negative correlation must be the stronger one.
+const UPSIDE_DOWN: f64 = 0.1;
 
 /// `a`, the series under test, with `b`, the witness.
 ///
@@ -144,16 +147,20 @@ pub fn compare(a: &RawSeries<'_>, b: &RawSeries<'_>, options: &Options) -> Resul
     let (mut pair, mut bias_m) = aligned(0.0)?;
     let band_hz = (options.band_hz.0, options.band_hz.1.min(0.25 * pair.rate_hz));
     let mut lag_s = None;
-    if let Some(best) = lag::best(&pair, options.max_lag_s)?
-        && best.inside
-        && best.lag_s.abs() <= options.max_lag_s
-        && best.correlation > 4.0 / freedom(&pair, band_hz, noise_density)?.sqrt()
-    {
-        // Once more from there: the parabola's own error, and that of resampling, then vanish with what is left.
-        (pair, bias_m) = aligned(best.lag_s)?;
-        let left_s = lag::best(&pair, 2.0 / pair.rate_hz)?.filter(|left| left.inside).map_or(0.0, |left| left.lag_s);
-        (pair, bias_m) = if left_s == 0.0 { (pair, bias_m) } else { aligned(best.lag_s + left_s)? };
-        lag_s = Some(best.lag_s + left_s);
+    let mut upside_down = None;
+    if let Some(best) = lag::best(&pair, options.max_lag_s)? {
+        // Unrelated records correlate with a deviation of one over the root of their degrees of freedom.
+        let chance = 4.0 / Spectra::of(&pair, band_hz, noise_density)?.both().freedom().sqrt();
+        // A sea's own highest and lowest correlations differ by a quarter; a regular wave's do not, and it has no upside.
+        if -best.lowest > chance && -best.lowest > best.correlation + UPSIDE_DOWN {
+            upside_down = Some(best.lowest);
+        } else if best.inside && best.lag_s.abs() <= options.max_lag_s && best.correlation > chance {
+            // Once more from there: the parabola's own error, and that of resampling, then vanish with what is left.
+            (pair, bias_m) = aligned(best.lag_s)?;
+            let left_s = lag::best(&pair, 2.0 / pair.rate_hz)?.filter(|left| left.inside).map_or(0.0, |left| left.lag_s);
+            (pair, bias_m) = if left_s == 0.0 { (pair, bias_m) } else { aligned(best.lag_s + left_s)? };
+            lag_s = Some(best.lag_s + left_s);
+        }
     }
 
     let common = pair.both().count();
@@ -170,87 +177,16 @@ pub fn compare(a: &RawSeries<'_>, b: &RawSeries<'_>, options: &Options) -> Resul
         common_s,
         common_share: (common_s / shortest_s).min(1.0),
         lag_s,
+        upside_down,
         correlation: regression.correlation(),
         regression,
         bias_m,
         rmse_m,
         band_hz,
-        at_peak: spectra.coarse.at_peak(band_hz),
+        at_peak: spectra.coarse.at_peak(band_hz, noise_density[1]),
         a: seen_a?,
         b: seen_b?,
         height_ratio: both.heights(options.scale_95),
         period_ratio: both.periods(PERIOD_SCALE_95),
     })
-}
-
-/// Degrees of freedom: unrelated records correlate with a deviation of one over their root.
-fn freedom(pair: &Pair, band_hz: Interval, noise_density: [f64; 2]) -> Result<f64, CompareError> {
-    Ok(Spectra::of(pair, band_hz, noise_density)?.both().freedom())
-}
-
-/// Both spectra, steady and finely resolved.
-struct Spectra {
-    band_hz: Interval,
-    coarse: CrossSpectrum,
-    fine: CrossSpectrum,
-    a: Moments,
-    b: Moments,
-}
-
-impl Spectra {
-    fn of(pair: &Pair, band_hz: Interval, [noise_a, noise_b]: [f64; 2]) -> Result<Self, CompareError> {
-        let stretches = pair.stretches();
-        let longest = stretches.iter().map(|stretch| stretch.0.len()).max().unwrap_or(0);
-        let short = CompareError::TooShort { samples: longest, samples_min: SAMPLES_MIN };
-        let of = |parts: usize| CrossSpectrum::of(&stretches, longest / parts, pair.rate_hz).ok_or(short);
-        let (coarse, fine) = (of(8)?, of(3)?);
-        let none = CompareError::Band { rate_hz: pair.rate_hz, low_hz: band_hz.0 };
-        if coarse.lines(band_hz).count() < 3 {
-            return Err(none);
-        }
-        let a = Moments::of(&coarse.aa_m2_per_hz, coarse.df_hz, coarse.lines(band_hz), noise_a);
-        let b = Moments::of(&coarse.bb_m2_per_hz, coarse.df_hz, coarse.lines(band_hz), noise_b);
-        for (which, moments) in [(Which::A, a), (Which::B, b)] {
-            if !(moments.m0_m2 > 0.0 && moments.m0_m2.is_finite()) {
-                return Err(CompareError::Flat { which });
-            }
-        }
-        Ok(Self { band_hz, coarse, fine, a, b })
-    }
-
-    fn both(&self) -> Both<'_> {
-        Both { cross: &self.fine, band_hz: self.band_hz, a: self.a, b: self.b }
-    }
-
-    fn waves(&self, pair: &Pair, which: Which, options: &Options) -> Result<Waves, CompareError> {
-        let flat = CompareError::Flat { which };
-        let (density, moments) = match which {
-            Which::A => (&self.coarse.aa_m2_per_hz, self.a),
-            Which::B => (&self.coarse.bb_m2_per_hz, self.b),
-        };
-        let spectrum = SampledSpectrum::new(self.coarse.df_hz, &density[..]).map_err(|_| flat)?;
-        let records: Vec<Record> = pair
-            .stretches()
-            .into_iter()
-            .filter_map(|(a_m, b_m)| Record::new(if which == Which::A { a_m } else { b_m }, pair.rate_hz).ok())
-            .collect();
-        // Intervals need one record: joined over the gaps, whose few jumps weigh nothing beside the waves.
-        let joined: Vec<f64> = records.iter().flat_map(|record| record.samples_m().iter().copied()).collect();
-        let joined = Record::new(joined, pair.rate_hz).map_err(|_| flat)?;
-        let found = spectrum.statistics(self.band_hz.0, self.band_hz.1).ok_or(flat)?;
-        let intervals = SpectralIntervals::of(&joined, &spectrum, &found, self.band_hz).ok_or(flat)?;
-        let peak = PeakPeriods::of(&spectrum, self.band_hz).ok_or(flat)?;
-        // Beyond the noise of the worse one: both then count the same waves.
-        let deadband_m = 2.0 * options.noise_a_m.max(options.noise_b_m);
-        let all: Vec<Wave> = records.iter().flat_map(|record| waves(record, Crossing::Up, deadband_m)).collect();
-        Ok(Waves {
-            h_m0_m: found.h_m0_m,
-            h_m0_95_m: intervals.h_m0_m,
-            f_p_hz: 1.0 / peak.parabola_s,
-            t_p_95_s: intervals.t_p_s,
-            crossing: WaveStatistics::of(&all),
-            crossing_95: WaveIntervals::of(&all),
-            noise_m0_m2: moments.noise_m0_m2,
-        })
-    }
 }

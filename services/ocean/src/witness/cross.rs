@@ -34,8 +34,8 @@ pub struct AtPeak {
     pub averages: f64,
     /// What γ² of two unrelated records stays under with 95 % probability: 1 − 0.05^(1/(n − 1)) (Bendat and Piersol 2010, 9.2).
     pub coherence_by_chance: f64,
-    /// Gain from b to a, |S_ab|/S_bb: 1 for sensors of the same scale. Noise in b lowers it as it does a slope, but only by the noise
-    /// that lies under the peak.
+    /// Gain from b to a, |S_ab|/(S_bb − the noise of b): 1 for sensors of the same scale. Noise in b that nobody gave lowers it as it does a
+    /// slope, but only by what lies under the peak.
     pub gain: f64,
     /// Its 95 % interval: ± t √((1 − γ²)/(2n − 2))·√(S_aa/S_bb) (Bendat and Piersol 2010, 9.2.3, for small n with Student's t).
     pub gain_95: Interval,
@@ -110,10 +110,10 @@ impl CrossSpectrum {
         (1..self.aa_m2_per_hz.len()).filter(move |line| (low_hz..=high_hz).contains(&(*line as f64 * df_hz)))
     }
 
-    /// About the highest line of the geometric mean of both spectra within `band_hz`; `None` where they share no energy or there are fewer
-    /// than two independent estimates.
+    /// About the highest line of the geometric mean of both spectra within `band_hz`, with the density of b's noise; `None` where they share
+    /// no energy, b no more than its noise, or there are fewer than two independent estimates.
     #[must_use]
-    pub fn at_peak(&self, band_hz: Interval) -> Option<AtPeak> {
+    pub fn at_peak(&self, band_hz: Interval, noise_b_m2_per_hz: f64) -> Option<AtPeak> {
         let shared = |line: usize| (self.aa_m2_per_hz[line] * self.bb_m2_per_hz[line]).sqrt();
         let top = self.lines(band_hz).max_by(|a, b| shared(*a).total_cmp(&shared(*b)))?;
         let high = |line: &usize| shared(*line) >= 0.5 * shared(top);
@@ -126,13 +126,14 @@ impl CrossSpectrum {
             ab += self.ab_m2_per_hz[line];
         }
         let averages = self.averages * independent_lines(to - from + 1);
-        if !(aa > 0.0 && bb > 0.0 && averages > 2.0) {
+        let waves_bb = bb - noise_b_m2_per_hz * (to - from + 1) as f64;
+        if !(aa > 0.0 && waves_bb > 0.0 && averages > 2.0) {
             return None;
         }
         let coherence = (ab.norm_sqr() / (aa * bb)).min(1.0);
         let freedom = 2.0 * averages - 2.0;
-        let gain = ab.norm() / bb;
-        let half = student_95(freedom) * ((1.0 - coherence) / freedom * aa / bb).sqrt();
+        let gain = ab.norm() / waves_bb;
+        let half = student_95(freedom) * ((1.0 - coherence) / freedom * aa * bb).sqrt() / waves_bb;
         Some(AtPeak {
             band_hz: (from as f64 * self.df_hz, to as f64 * self.df_hz),
             coherence,

@@ -13,6 +13,8 @@ pub(super) struct Best {
     pub(super) lag_s: f64,
     /// Pearson's correlation there, of the parabola through the three highest.
     pub(super) correlation: f64,
+    /// The lowest of the sampled correlations.
+    pub(super) lowest: f64,
     /// Not at an end of the search, where the true highest may lie outside.
     pub(super) inside: bool,
 }
@@ -34,15 +36,16 @@ pub(super) fn best(pair: &Pair, max_lag_s: f64) -> Result<Option<Best>, CompareE
     else {
         return Ok(None);
     };
+    let lowest = found.iter().copied().fold(f64::INFINITY, f64::min);
     let at = |index: usize| (index as f64 - reach as f64 - 1.0) / pair.rate_hz;
     if top == 0 || top + 1 == found.len() {
-        return Ok(Some(Best { lag_s: at(top), correlation: highest, inside: false }));
+        return Ok(Some(Best { lag_s: at(top), correlation: highest, lowest, inside: false }));
     }
     let (before, after) = (found[top - 1], found[top + 1]);
     let bend = before - 2.0 * highest + after;
     let offset = if bend < 0.0 { (0.5 * (before - after) / bend).clamp(-0.5, 0.5) } else { 0.0 };
     let correlation = (highest - 0.25 * (before - after) * offset).min(1.0);
-    Ok(Some(Best { lag_s: at(top) + offset / pair.rate_hz, correlation, inside: true }))
+    Ok(Some(Best { lag_s: at(top) + offset / pair.rate_hz, correlation, lowest, inside: true }))
 }
 
 /// Of `a` with `b` taken `shift` samples later, over the instants that both have.

@@ -19,6 +19,7 @@ pub mod cross;
 mod lag;
 pub mod ratio;
 pub mod regression;
+mod spectra;
 #[cfg(test)]
 mod tests;
 
