@@ -69,7 +69,9 @@ mod tests {
     /// Tables of the normal distribution.
     #[test]
     fn the_normal_distribution_is_the_published_one() {
-        for (z, expected) in [(0.0, 0.5), (1.0, 0.841_344_746), (-1.0, 0.158_655_254), (1.959_963_985, 0.975), (-3.0, 0.001_349_898)] {
+        for (z, expected) in
+            [(0.0, 0.5), (1.0, 0.841_344_746), (-1.0, 0.158_655_254), (1.959_963_985, 0.975), (-3.0, 0.001_349_898)]
+        {
             assert_relative_eq!(normal_cumulative(z), expected, max_relative = 1e-6);
         }
         assert_eq!((normal_cumulative(f64::INFINITY), normal_cumulative(f64::NEG_INFINITY)), (1.0, 0.0));

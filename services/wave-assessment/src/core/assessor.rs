@@ -1,6 +1,8 @@
 //! From patch to sea state.
 
-use halcyon_model::{Directional, IdError, LocalPoint, QualityFlag, RigId, SeaState, Stamp, SurfacePatch, Verdict, VerdictReason, VerdictState};
+use halcyon_model::{
+    Directional, IdError, LocalPoint, QualityFlag, RigId, SeaState, Stamp, SurfacePatch, Verdict, VerdictReason, VerdictState,
+};
 
 use super::ahead::calm;
 use super::direction::directional;

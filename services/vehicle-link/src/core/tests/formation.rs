@@ -1,6 +1,5 @@
 //! Keeping a slot beside a leader whose states can't be trusted, or that stands at the least separation.
 
-
 use halcyon_model::{Activity, LocalPoint, Task, VehicleState};
 use nalgebra::Vector3;
 
