@@ -254,7 +254,7 @@ impl Fleet {
         messages.extend(
             self.sea_states
                 .since(revision)
-                .map(|kept| StreamMessage::SeaState(dto::SeaState::new(&kept.value, kept.stale, &edge))),
+                .map(|kept| StreamMessage::SeaState(Box::new(dto::SeaState::new(&kept.value, kept.stale, &edge)))),
         );
         messages
             .extend(self.missions.since(revision).map(|kept| StreamMessage::Mission(dto::Mission::new(&kept.value, &edge))));

@@ -42,7 +42,7 @@ pub enum StreamMessage {
     /// A vehicle's state.
     Vehicle(Vehicle),
     /// A sea state.
-    SeaState(SeaState),
+    SeaState(Box<SeaState>),
     /// A mission.
     Mission(Mission),
     /// The plan.

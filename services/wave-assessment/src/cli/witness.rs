@@ -143,6 +143,7 @@ fn difference(difference: &Difference) -> String {
         format!("{what} is {:.3} times the witness's ({low:.3} to {high:.3})", ratio.value)
     };
     match difference {
+        Difference::UpsideDown { .. } => "it moves the other way, as if one of the two were positive down".into(),
         Difference::Height(of) => ratio("H_m0", of),
         Difference::Period(of) => ratio("the mean period", of),
         Difference::Peak { a_s, b_s } => {
@@ -163,7 +164,7 @@ fn ignorance(ignorance: &Ignorance) -> String {
         Ignorance::LittleOverlap { share, share_min } => {
             format!("{:.0} % of the shorter record in common, {:.0} % needed", 100.0 * share, 100.0 * share_min)
         }
-        Ignorance::NoWaves { which, .. } => format!("{} shows no waves above its noise", which),
+        Ignorance::NoWaves { which, .. } => format!("{which} shows no waves above its noise"),
         Ignorance::Undersampled { f_p_hz, high_hz } => {
             format!("the peak at {f_p_hz:.2} Hz is too near to the {high_hz:.2} Hz that the slower one can show")
         }

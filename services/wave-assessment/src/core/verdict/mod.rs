@@ -157,7 +157,7 @@ fn vehicle(checks: &mut Checks, statistics: &Statistics, config: &Config, airfra
     let kept = 1.0 - config.airframe.margin;
     match statistics.tilt_rad(landing_s) {
         Some(tilt) => {
-            checks.limit("tilt", "expected steepest water of the landing", "rad", tilt, airframe.tip_angle_rad * kept)
+            checks.limit("tilt", "expected steepest water of the landing", "rad", tilt, airframe.tip_angle_rad * kept);
         }
         None => checks.unknown("tilt", "slope could not be measured"),
     }
