@@ -18,7 +18,7 @@ pub struct Options {
     pub max_lag_s: f64,
     /// Readings further apart than this many of their series' usual interval are a gap, which is left out.
     pub gap_intervals: f64,
-    /// Where waves are, hertz. The upper end is lowered to a quarter of the common rate: splines keep 97 % of a wave of four samples.
+    /// Where waves are, hertz. The upper end is lowered to a quarter of the common rate: splines keep 98.6 % of a wave of four samples.
     pub band_hz: Interval,
     /// Standard deviation of a single reading's noise of the series under test, metres; white.
     pub noise_a_m: f64,

@@ -5,7 +5,7 @@
 //! | module | holds |
 //! |---|---|
 //! | [`mod@compare`] | two series of different rates, gaps and clocks, compared |
-//! | [`agreement`] | whether they agree within what chance and the sensors leave open |
+//! | [`mod@agreement`] | whether they agree within what chance and the sensors leave open |
 //! | [`ratio`] | intervals of ratios of two records of the same, partly the same, or different waves |
 //! | [`regression`] | slopes where one or both have errors |
 //! | [`cross`] | auto and cross spectra, coherence, gain |
