@@ -156,9 +156,8 @@ fn different_waves_of_one_sea_agree_as_often_as_they_should() {
         }
     }
     let share = f64::from(agree) / n as f64;
-    println!(
-        "agree {share:.3}; height {height}, period {period}, peak {peak}, lags {lags}; H at 95 %: {heights_95} of {n}; deviation {deviation:.3}"
-    );
+    println!("agree {share:.3}; height {height}, period {period}, peak {peak}, lags {lags}");
+    println!("H at 95 %: {heights_95} of {n}; deviation {deviation:.3}");
     assert!((share - 0.95).abs() < 0.04, "{share}");
 }
 
@@ -280,8 +279,8 @@ fn a_peak_elsewhere_is_told() {
     assert!(why.iter().any(|difference| matches!(difference, Difference::Peak { .. })), "{why:?}");
 }
 
-/// The scale is taken as exact, so that chance and what is known of the noise are left. Here the noise is known exactly: what the ratio
-/// scatters by is chance alone, the rest of its deviation is for noise that is not known so well.
+/// The scale is taken as exact, so that chance and what is known of the noise are left. Here the noise is known exactly: what the
+/// ratio scatters by is chance alone, the rest of its deviation is for noise that is not known so well.
 #[test]
 fn the_same_waves_under_noise_differ_as_much_as_they_should() {
     let options = Options { noise_a_m: 0.03, noise_b_m: 0.05, scale_95: 0.0, ..Options::default() };
