@@ -223,8 +223,12 @@ export class World {
       rig: leader.id, stamp: this.stamp(), age_s: 0, stale: false, window_start: this.stamp(-window_s), window_s, local: point(leader.at),
       patches: Math.floor(window_s * 5), coverage: 0.91, waves, h_mean_m: this.estimate(h.value * 0.63), h_s_m: h, h_max_m: this.estimate(h.value * 1.6),
       h_m0_m: this.estimate(h.value * 1.04), t_z_s: this.estimate(1.32), slope_rms_rad: this.estimate(0.033),
+      h_rms_m: this.estimate(h.value * 0.7), h_tenth_m: this.estimate(h.value * 1.26), t_p_s: this.estimate(1.41), t_m01_s: this.estimate(1.36),
+      t_m02_s: this.estimate(1.3), t_e_s: this.estimate(1.39), vertical_speed_rms_mps: this.estimate((h.value / 4) * 4.8),
+      directional: { from_deg: 241, from_error_deg: 7, spread_deg: 24, wavelength_peak_m: 3.1 },
+      quality: [], calm: { local: point(leader.at), from: this.stamp(), error_share: 0.6, windows: [{ from: this.stamp(), to: this.stamp(4) }] },
       trace: Array.from({ length: Math.floor(window_s * 5) }, (_, i) => ({ t_s: i / 5 - window_s, elevation_m: this.elevation_m(this.t_s() - window_s + i / 5) })),
-      verdict: { state, reasons, valid_until: this.stamp(VALID_S), expired: false },
+      verdict: { state, probability: state === 'safe' ? 0.999 : 0.4, reasons, valid_until: this.stamp(VALID_S), expired: false },
     };
   }
 

@@ -1,6 +1,6 @@
 use halcyon_model::{
-    CalmForecast, CalmWindow, Directional, Estimate, QualityFlag, SeaState, Stamp, TracePoint, Verdict, VerdictReason, VerdictState,
-    WaveSpectrum,
+    CalmForecast, CalmWindow, Directional, Estimate, QualityFlag, SeaState, Stamp, TracePoint, Verdict, VerdictReason,
+    VerdictState, WaveSpectrum,
 };
 
 use super::geo::{point_from, point_to};

@@ -40,7 +40,8 @@ pub use id::{FleetId, IdError, InstanceId, MissionId, RigId, VehicleId};
 pub use mission::{Approval, Mission, MissionPhase, MissionSpec, Transition};
 pub use plan::{Assignment, Clearance, DispatchPlan, Slot, Task};
 pub use sea::{
-    CalmForecast, CalmWindow, Directional, Estimate, QualityFlag, SeaState, TracePoint, Verdict, VerdictReason, VerdictState, WaveSpectrum,
+    CalmForecast, CalmWindow, Directional, Estimate, QualityFlag, SeaState, TracePoint, Verdict, VerdictReason, VerdictState,
+    WaveSpectrum,
 };
 pub use service::{Event, Health, HealthState, Severity};
 pub use stereo::{

@@ -5,11 +5,11 @@ mod report;
 mod shape;
 mod survey;
 mod verdict;
+mod witness;
 
 use std::path::{Path, PathBuf};
 
 use halcyon_ocean::Taper;
-use halcyon_ocean::quality::readings::ReadingLimits;
 use halcyon_ocean::quality::{Finding, Flag, Limits, RawSeries, assess};
 
 pub use crests::CrestReport;
@@ -17,8 +17,10 @@ pub use report::{Band, Burst, FlagReport, Spectrum, WavesReport, ZeroCrossing};
 pub use shape::{Fit, Shape, System};
 pub use survey::{ComplaintReport, DirectionReport, Heights, SeaReport, Survey, SurveyError};
 pub use verdict::{ReasonReport, VerdictReport, verdict};
+pub use witness::{ComparisonReport, Witness, WitnessReport};
 
-use crate::table::{Choice, ChoiceError, Table, TableError};
+use crate::core::quality_limits;
+use crate::table::{Choice, ChoiceError, Readings, Table, TableError};
 
 /// Files larger than this are refused: 30 hours at 1 kHz are smaller.
 const FILE_BYTES_MAX: u64 = 1 << 32;
@@ -38,6 +40,8 @@ pub struct WavesOptions {
     pub segment_s: f64,
     /// What they are multiplied by.
     pub taper: Taper,
+    /// Another sensor's record of the same waves.
+    pub witness: Option<Witness>,
 }
 
 /// Why a file has no waves to speak of.
@@ -104,18 +108,22 @@ pub enum WavesError {
 /// [`WavesError`], one clear line with its causes.
 pub fn waves(options: &WavesOptions) -> Result<WavesReport, WavesError> {
     check(options)?;
-    let path = &options.input;
-    let bytes = read(path)?;
-    let table = Table::read(&bytes).map_err(|source| WavesError::Table { path: path.clone(), source })?;
-    drop(bytes);
-    let readings = table.readings(&options.choice).map_err(|source| WavesError::Choice { path: path.clone(), source })?;
-    drop(table);
+    let readings = readings(&options.input, &options.choice)?;
     let raw = RawSeries { stamp_s: &readings.stamp_s, elevation_m: &readings.elevation_m };
     let bursts = match options.burst_s {
         None => vec![burst(raw, options)?],
         Some(burst_s) => bursts(raw, burst_s, options)?,
     };
-    Ok(WavesReport::new(&readings, bursts))
+    let witness = options.witness.as_ref().map(|witness| WitnessReport::of(raw, witness, options.band_hz)).transpose()?;
+    Ok(WavesReport::new(&readings, bursts, witness))
+}
+
+/// The readings of a file.
+fn readings(path: &Path, choice: &Choice) -> Result<Readings, WavesError> {
+    let bytes = read(path)?;
+    let table = Table::read(&bytes).map_err(|source| WavesError::Table { path: path.into(), source })?;
+    drop(bytes);
+    table.readings(choice).map_err(|source| WavesError::Choice { path: path.into(), source })
 }
 
 fn check(options: &WavesOptions) -> Result<(), WavesError> {
@@ -180,10 +188,7 @@ fn burst(raw: RawSeries<'_>, options: &WavesOptions) -> Result<Burst, WavesError
 
 /// One record's quality and statistics; in words why there are none.
 fn analyse(raw: RawSeries<'_>, segment_s: f64, taper: Taper, band_hz: (f64, f64)) -> Result<Burst, String> {
-    // What is rejected is filled in, and a crest that was real would be lost: an hour at 10 Hz of a Gaussian sea reaches 4.2 deviations on
-    // average, and 6 once in 14,000 such hours.
-    let readings = ReadingLimits { spike_sigmas: 6.0, ..ReadingLimits::default() };
-    let assessment = assess(raw, &Limits { segment_s, readings, ..Limits::default() });
+    let assessment = assess(raw, &Limits { segment_s, ..quality_limits() });
     let Some(even) = &assessment.even else { return Err(why_none(&assessment.findings)) };
     Burst::new(even, &assessment, (segment_s, taper), band_hz).map_err(|error| error.to_string())
 }

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 use halcyon_ocean::Taper;
 use halcyon_wave_assessment::Config;
-use halcyon_wave_assessment::cli::{WavesError, WavesOptions, WavesReport, verdict, waves};
+use halcyon_wave_assessment::cli::{WavesError, WavesOptions, WavesReport, Witness, verdict, waves};
 use halcyon_wave_assessment::table::Choice;
 use tempfile::TempDir;
 
@@ -28,7 +28,46 @@ impl Files {
 
 fn options(input: PathBuf, rate_hz: Option<f64>) -> WavesOptions {
     let choice = Choice { rate_hz, ..Choice::default() };
-    WavesOptions { input, choice, burst_s: None, band_hz: (0.05, f64::INFINITY), segment_s: 64.0, taper: Taper::Hann }
+    let (band_hz, taper) = ((0.05, f64::INFINITY), Taper::Hann);
+    WavesOptions { input, choice, burst_s: None, band_hz, segment_s: 64.0, taper, witness: None }
+}
+
+/// A sea of eleven waves that never repeats, 4 √m0 = 0.2 m.
+fn sea_m(t_s: f64) -> f64 {
+    (0..11).map(|i| 0.0213 * (TAU * (0.21 + 0.0391 * f64::from(i)) * t_s + f64::from(i * i)).sin()).sum()
+}
+
+/// The same waves by two sensors, of other rates and clocks, agree; one that sees them a quarter higher does not, and what cannot be
+/// compared is no agreement either.
+#[test]
+fn a_second_witness_must_agree() {
+    let files = Files::new();
+    let record = files.put("stereo.csv", table(6000, 10.0, sea_m));
+    let judged = |text: String| {
+        let witness = Witness { input: files.put("probe.csv", text), choice: Choice::default(), max_lag_s: 2.0 };
+        let report = waves(&WavesOptions { witness: Some(witness), ..options(record.clone(), None) }).unwrap();
+        let mut verdict =
+            verdict(&report.first, &Config { h_s_m_max: 1.0, h_tenth_m_max: 1.0, h_highest_m_max: 1.0, ..Config::default() });
+        let alone = verdict.state;
+        let witness = report.witness.unwrap();
+        witness.weigh(&mut verdict);
+        (witness, alone, verdict)
+    };
+    let (same, alone, weighed) = judged(table(4200, 7.0, |t_s| 0.4 + sea_m(t_s - 0.13)));
+    assert_eq!((same.verdict, alone, weighed.state), ("agree", "safe", "safe"), "{same:?} {weighed:?}");
+    let found = same.comparison.unwrap();
+    assert!((found.lag_s.unwrap() - 0.13).abs() < 0.01, "{found:?}");
+    assert!((found.slope - 1.0).abs() < 0.01 && found.r_squared > 0.99 && (found.bias_m + 0.4).abs() < 0.01, "{found:?}");
+    let (higher, _, weighed) = judged(table(4200, 7.0, |t_s| 1.25 * sea_m(t_s)));
+    assert_eq!((higher.verdict, weighed.state, weighed.probability), ("disagree", "inconclusive", None), "{higher:?}");
+    assert!((higher.comparison.unwrap().height_ratio.unwrap() - 0.8).abs() < 0.01);
+    let later: Vec<String> = table(4200, 7.0, sea_m)
+        .lines()
+        .map(|line| line.replacen("", if line.starts_with('t') { "" } else { "9" }, 1))
+        .collect();
+    let (elsewhere, _, weighed) = judged(later.join("\n"));
+    assert_eq!((elsewhere.verdict, weighed.state), ("unknown", "inconclusive"), "{elsewhere:?}");
+    assert!(!weighed.reasons[0].passed && weighed.reasons[0].check == "witness");
 }
 
 fn table(samples: usize, rate_hz: f64, elevation_m: impl Fn(f64) -> f64) -> String {

@@ -260,6 +260,23 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/rigs/{id}/spectrum": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** The spectrum of the newest sea state, with its 95 % interval. */
+        get: operations["show_spectrum"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/rigs/{id}/surface": {
         parameters: {
             query?: never;
@@ -458,6 +475,27 @@ export interface components {
          * @enum {string}
          */
         Approval: "manual" | "automatic";
+        /** @description A forecast of the surface at one place over the next seconds. */
+        Calm: {
+            /**
+             * Format: double
+             * @description Expected error of the elevation three seconds ahead over the sea's own standard deviation; 1 where nothing is known.
+             */
+            error_share: number;
+            /** @description Start of the forecast. */
+            from: string;
+            /** @description Where. */
+            local: components["schemas"]["Point"];
+            /** @description When every upper 95 % bound stays under its limit, soonest first. */
+            windows: components["schemas"]["CalmWindow"][];
+        };
+        /** @description A quiet moment. */
+        CalmWindow: {
+            /** @description Start. */
+            from: string;
+            /** @description End. */
+            to: string;
+        };
         /** @description The answer to an accepted command. It is being carried out; watch `watch`, or the live stream, to see it done. */
         CommandResult: {
             /** @description Always `true`: a refused command is a problem with status 409. */
@@ -492,6 +530,29 @@ export interface components {
              * @description Height of the survey above mean water, metres; 5 if left out.
              */
             survey_height_m?: number | null;
+        };
+        /** @description Direction and length of the waves. */
+        Directional: {
+            /**
+             * Format: double
+             * @description Mean direction that waves come from, degrees clockwise from true north.
+             */
+            from_deg: number;
+            /**
+             * Format: double
+             * @description 95 % bounds of it: this much to either side, degrees.
+             */
+            from_error_deg: number;
+            /**
+             * Format: double
+             * @description Circular spread, degrees.
+             */
+            spread_deg: number;
+            /**
+             * Format: double
+             * @description Length of the waves at the peak, metres.
+             */
+            wavelength_peak_m: number;
         };
         /** @description A measured number with its 95 % confidence interval, in the unit of its key. */
         Estimate: {
@@ -792,15 +853,19 @@ export interface components {
                  * @description Seconds since then when this was sent.
                  */
                 age_s: number;
+                calm: components["schemas"]["Calm"] | null;
                 /**
                  * Format: double
                  * @description Mean coverage of those patches, 0 to 1.
                  */
                 coverage: number;
+                directional: components["schemas"]["Directional"] | null;
                 h_m0_m: components["schemas"]["Estimate"] | null;
                 h_max_m: components["schemas"]["Estimate"] | null;
                 h_mean_m: components["schemas"]["Estimate"] | null;
+                h_rms_m: components["schemas"]["Estimate"] | null;
                 h_s_m: components["schemas"]["Estimate"] | null;
+                h_tenth_m: components["schemas"]["Estimate"] | null;
                 /** @description Mean place of the patches. */
                 local: components["schemas"]["Point"];
                 /**
@@ -808,6 +873,8 @@ export interface components {
                  * @description Patches used.
                  */
                 patches: number;
+                /** @description Quality tests that did not pass. */
+                quality: components["schemas"]["QualityFlag"][];
                 /** @description The rig that measured it. */
                 rig: string;
                 slope_rms_rad: components["schemas"]["Estimate"] | null;
@@ -815,11 +882,16 @@ export interface components {
                 stale: boolean;
                 /** @description When it was issued. */
                 stamp: string;
+                t_e_s: components["schemas"]["Estimate"] | null;
+                t_m01_s: components["schemas"]["Estimate"] | null;
+                t_m02_s: components["schemas"]["Estimate"] | null;
+                t_p_s: components["schemas"]["Estimate"] | null;
                 t_z_s: components["schemas"]["Estimate"] | null;
                 /** @description Elevation at the patch centre over the window, oldest first. */
                 trace: components["schemas"]["TraceSample"][];
                 /** @description The verdict. */
                 verdict: components["schemas"]["Verdict"];
+                vertical_speed_rms_mps: components["schemas"]["Estimate"] | null;
                 /**
                  * Format: int32
                  * @description Individual waves counted.
@@ -1107,6 +1179,15 @@ export interface components {
             /** @description Which kind of problem, as a stable URI: `urn:halcyon:problem:` and a word. */
             type: string;
         };
+        /** @description A quality test that did not pass. */
+        QualityFlag: {
+            /** @description Failed, and not only suspect. */
+            failed: boolean;
+            /** @description Stable name of the test, such as `spike`. */
+            test: string;
+            /** @description For people. */
+            text: string;
+        };
         /** @description Whether the gateway can do its work. */
         Readiness: {
             /** @description The checks. */
@@ -1135,15 +1216,19 @@ export interface components {
              * @description Seconds since then when this was sent.
              */
             age_s: number;
+            calm: components["schemas"]["Calm"] | null;
             /**
              * Format: double
              * @description Mean coverage of those patches, 0 to 1.
              */
             coverage: number;
+            directional: components["schemas"]["Directional"] | null;
             h_m0_m: components["schemas"]["Estimate"] | null;
             h_max_m: components["schemas"]["Estimate"] | null;
             h_mean_m: components["schemas"]["Estimate"] | null;
+            h_rms_m: components["schemas"]["Estimate"] | null;
             h_s_m: components["schemas"]["Estimate"] | null;
+            h_tenth_m: components["schemas"]["Estimate"] | null;
             /** @description Mean place of the patches. */
             local: components["schemas"]["Point"];
             /**
@@ -1151,6 +1236,8 @@ export interface components {
              * @description Patches used.
              */
             patches: number;
+            /** @description Quality tests that did not pass. */
+            quality: components["schemas"]["QualityFlag"][];
             /** @description The rig that measured it. */
             rig: string;
             slope_rms_rad: components["schemas"]["Estimate"] | null;
@@ -1158,11 +1245,16 @@ export interface components {
             stale: boolean;
             /** @description When it was issued. */
             stamp: string;
+            t_e_s: components["schemas"]["Estimate"] | null;
+            t_m01_s: components["schemas"]["Estimate"] | null;
+            t_m02_s: components["schemas"]["Estimate"] | null;
+            t_p_s: components["schemas"]["Estimate"] | null;
             t_z_s: components["schemas"]["Estimate"] | null;
             /** @description Elevation at the patch centre over the window, oldest first. */
             trace: components["schemas"]["TraceSample"][];
             /** @description The verdict. */
             verdict: components["schemas"]["Verdict"];
+            vertical_speed_rms_mps: components["schemas"]["Estimate"] | null;
             /**
              * Format: int32
              * @description Individual waves counted.
@@ -1259,6 +1351,40 @@ export interface components {
              * @description Metres above the leader.
              */
             up_m: number;
+        };
+        /** @description One-sided variance density of the elevation. */
+        Spectrum: {
+            /**
+             * Format: double
+             * @description Seconds since then when this was sent.
+             */
+            age_s: number;
+            /**
+             * Format: double
+             * @description Degrees of freedom of each density.
+             */
+            degrees_of_freedom: number;
+            /** @description Density, m²/Hz, at 0, `df_hz`, 2 `df_hz` … */
+            density_m2_per_hz: number[];
+            /**
+             * Format: double
+             * @description Distance between two frequencies, hertz.
+             */
+            df_hz: number;
+            /**
+             * Format: double
+             * @description A density times this is the upper end of its 95 % interval.
+             */
+            high_factor: number;
+            /**
+             * Format: double
+             * @description A density times this is the lower end of its 95 % interval.
+             */
+            low_factor: number;
+            /** @description The rig that measured it. */
+            rig: string;
+            /** @description When it was issued. */
+            stamp: string;
         };
         /**
          * @description One message of the live stream. After `hello` comes one message for everything known, then one for whatever changes: the whole
@@ -1560,6 +1686,11 @@ export interface components {
         Verdict: {
             /** @description Whether that time has passed: then treat it as inconclusive. */
             expired: boolean;
+            /**
+             * Format: double
+             * @description Probability that the water is under every limit, by the measurement.
+             */
+            probability: number | null;
             /** @description Every check, the failed ones first. */
             reasons: components["schemas"]["VerdictCheck"][];
             /** @description The verdict when it was issued. */
@@ -2139,6 +2270,36 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Series"];
+                };
+            };
+            /** @description A problem */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    show_spectrum: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Spectrum"];
                 };
             };
             /** @description A problem */

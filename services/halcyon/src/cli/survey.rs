@@ -12,7 +12,7 @@ use halcyon_wave_assessment::cli::{SeaReport, Survey};
 use serde::Serialize;
 
 use super::reconstruct::{How, frames, show};
-use super::waves::{draw, four, rows};
+use super::waves::{WitnessArgs, draw, four, rows, witness_rows};
 use super::{bad_input, output};
 use crate::report::{ChartError, Page};
 
@@ -41,6 +41,8 @@ pub(super) struct Args {
     /// One standard deviation of roll and pitch, degrees
     #[arg(long, value_name = "DEG", default_value_t = 0.5, allow_negative_numbers = true)]
     attitude_sigma_deg: f64,
+    #[command(flatten)]
+    witness: WitnessArgs,
     /// Write elevation maps over time, NetCDF-4 with CF names
     #[arg(long, value_name = "FILE.nc")]
     grid: Option<PathBuf>,
@@ -86,7 +88,8 @@ pub(super) fn run(options: &Options, args: &Args) -> anyhow::Result<ExitCode> {
     let maps = maps.into_iter().filter_map(|(option, path)| Some(Output::plain_file(option, path.as_ref()?, &["nc", "nc4"])));
     let pictures = frames.iter().flat_map(|frame| [frame.left.as_path(), frame.right.as_path()]);
     let outputs: Vec<Output> = report.into_iter().chain(maps).collect();
-    check_outputs(pictures.map(|path| ("DIR", path)), &outputs).map_err(bad_input)?;
+    let inputs = pictures.map(|path| ("DIR", path)).chain(args.witness.file().map(|path| ("--witness", path)));
+    check_outputs(inputs, &outputs).map_err(bad_input)?;
     let how = ReconstructOptions { grid: args.grid.clone(), wass: args.wass.clone(), ..args.how.options() };
     let is_fixed = frames.iter().all(|frame| frame.pose.is_none());
     let rig = halcyon_model::RigId::new("rig")?;
@@ -100,7 +103,7 @@ pub(super) fn run(options: &Options, args: &Args) -> anyhow::Result<ExitCode> {
     });
     bar.finish_and_clear();
     let survey = survey.map_err(bad_input)?;
-    let sea_state = sea.report(segment_s).map_err(bad_input)?;
+    let sea_state = sea.report(segment_s, args.witness.witness().as_ref()).map_err(bad_input)?;
     output::warnings(&survey.warnings);
     let judged = Judged { survey, verdict: sea_state.verdict.clone(), sea_state };
     if let Some(path) = &args.report {
@@ -176,6 +179,9 @@ fn print(judged: &Judged) -> anyhow::Result<()> {
     for [name, text] in heights(sea_state) {
         output::line(&format!("{name:<32} {text}"))?;
     }
+    for (name, text) in sea_state.witness.iter().flat_map(witness_rows) {
+        output::line(&format!("{name:<32} {text}"))?;
+    }
     if let Some(centre) = &sea_state.centre {
         output::line("at the middle of the patches:")?;
         for (name, text) in rows(centre) {
@@ -204,6 +210,10 @@ fn page(judged: &Judged, args: &Args) -> Result<Page, ChartError> {
         .collect();
     page.table(&["check", "", "what was found"], &reasons);
     page.heading("Sea state").table(&["quantity", "value"], &heights(sea_state));
+    if let Some(witness) = &sea_state.witness {
+        let rows: Vec<[String; 2]> = witness_rows(witness).into_iter().map(|(name, value)| [name, value]).collect();
+        page.table(&["second witness", "value"], &rows);
+    }
     if let Some(centre) = &sea_state.centre {
         page.heading("At the middle of the patches");
         draw(&mut page, centre)?;

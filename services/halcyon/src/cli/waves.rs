@@ -63,12 +63,76 @@ pub(super) struct Args {
     /// Their window
     #[arg(long, value_enum, default_value_t = Window::Hann)]
     window: Window,
+    #[command(flatten)]
+    witness: WitnessArgs,
     /// Draw it: .svg (the spectrum) or .html (everything)
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
     /// Print the result as JSON
     #[arg(long)]
     json: bool,
+}
+
+/// Another sensor's record of the same waves: a probe, an ultrasonic sensor, a rangefinder.
+#[derive(Debug, clap::Args)]
+pub(super) struct WitnessArgs {
+    /// Another sensor's record of the same waves, compared in time and frequency: without its agreement the verdict is inconclusive
+    #[arg(long, value_name = "FILE")]
+    witness: Option<PathBuf>,
+    /// Its column of stamps
+    #[arg(long, value_name = "COLUMN", requires = "witness")]
+    witness_time_column: Option<String>,
+    /// Its column of elevations
+    #[arg(long, value_name = "COLUMN", requires = "witness")]
+    witness_value_column: Option<String>,
+    /// Its readings a second, where it has no stamps
+    #[arg(long, value_name = "HZ", requires = "witness", allow_negative_numbers = true)]
+    witness_rate_hz: Option<f64>,
+    /// Its clock may be off by so much, seconds
+    #[arg(long, value_name = "S", default_value_t = 2.0, requires = "witness", allow_negative_numbers = true)]
+    witness_lag: f64,
+}
+
+impl WitnessArgs {
+    pub(super) fn file(&self) -> Option<&std::path::Path> {
+        self.witness.as_deref()
+    }
+
+    pub(super) fn witness(&self) -> Option<cli::Witness> {
+        Some(cli::Witness {
+            input: self.witness.clone()?,
+            choice: Choice {
+                time_column: self.witness_time_column.clone(),
+                value_column: self.witness_value_column.clone(),
+                rate_hz: self.witness_rate_hz,
+                time_unit: None,
+                unit: None,
+            },
+            max_lag_s: self.witness_lag,
+        })
+    }
+}
+
+/// A witness's comparison with its names and units.
+pub(super) fn witness_rows(report: &cli::WitnessReport) -> Vec<(String, String)> {
+    let mut rows = vec![("second witness".to_owned(), report.verdict.to_owned())];
+    rows.extend(report.why.iter().map(|why| ("  because".to_owned(), why.clone())));
+    let Some(c) = &report.comparison else { return rows };
+    let mut add = |name: &str, text: String| rows.push((format!("  {name}"), text));
+    add(
+        "time in common, lag",
+        format!("{:.1} s, {}", c.common_s, c.lag_s.map_or("unknown".into(), |lag| format!("{lag:.3} s"))),
+    );
+    add("H_m0 of both", format!("{} and {} m", four(c.h_m0_a_m), four(c.h_m0_b_m)));
+    if let (Some(value), low, high) = (c.height_ratio, c.height_ratio_low, c.height_ratio_high) {
+        add("ratio of heights", with_bounds(value, low, high, ""));
+    }
+    add("regression: slope, reduced axis, R²", format!("{}, {}, {}", four(c.slope), four(c.slope_reduced), four(c.r_squared)));
+    add("bias, RMS difference", format!("{} m, {} m", four(c.bias_m), four(c.rmse_m)));
+    if let Some(coherence) = c.coherence {
+        add("coherence at the peak", four(coherence));
+    }
+    rows
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -102,8 +166,8 @@ pub(super) fn run(options: &Options, args: &Args) -> anyhow::Result<ExitCode> {
         return Err(ConfigError::new("name the file of readings").into());
     };
     if let Some(plot) = &args.plot {
-        check_outputs([("FILE", input.as_path())], &[Output::file("--plot", plot, &["svg", "html", "htm"])])
-            .map_err(bad_input)?;
+        let inputs = [("FILE", input.as_path())].into_iter().chain(args.witness.file().map(|path| ("--witness", path)));
+        check_outputs(inputs, &[Output::file("--plot", plot, &["svg", "html", "htm"])]).map_err(bad_input)?;
     }
     let config: Config = options.settings()?.section()?;
     let options = WavesOptions {
@@ -119,13 +183,17 @@ pub(super) fn run(options: &Options, args: &Args) -> anyhow::Result<ExitCode> {
         band_hz: (args.band_low, args.band_high),
         segment_s: args.segment,
         taper: args.window.taper(),
+        witness: args.witness.witness(),
     };
     let report = cli::waves(&options).map_err(bad_input)?;
     if let Some(path) = &args.plot {
         let drawn = if has_ending(path, &["svg"]) { spectrum(&report.first)?.svg()? } else { page(&report, &options)?.html() };
         write_bytes(path, drawn.as_bytes()).map_err(bad_input)?;
     }
-    let verdict = cli::verdict(&report.first, &config);
+    let mut verdict = cli::verdict(&report.first, &config);
+    if let Some(witness) = &report.witness {
+        witness.weigh(&mut verdict);
+    }
     if args.json {
         output::json(&Judged { report: &report, verdict: &verdict })?;
         return Ok(ExitCode::SUCCESS);
@@ -151,6 +219,9 @@ struct Judged<'a> {
 fn print(report: &WavesReport, verdict: &VerdictReport) -> anyhow::Result<()> {
     let stamps = report.time_column.as_ref().map_or_else(|| "stated rate".to_owned(), |name| format!("{name:?}"));
     output::line(&format!("elevation {:?} ({}), stamps: {stamps}", report.value_column, report.unit))?;
+    for (name, row) in report.witness.iter().flat_map(witness_rows) {
+        output::line(&format!("{name:<36} {row}"))?;
+    }
     if report.bursts.is_empty() {
         print_burst(&report.first)?;
         output::line(&format!("verdict: {}", verdict.state))?;
@@ -342,6 +413,10 @@ pub(super) fn spectrum(burst: &Burst) -> Result<Chart, ChartError> {
 fn page(report: &WavesReport, options: &WavesOptions) -> Result<Page, ChartError> {
     let name = options.input.file_name().unwrap_or(options.input.as_os_str());
     let mut page = Page::new(format!("Waves of {}", name.display()));
+    if let Some(witness) = &report.witness {
+        let rows: Vec<[String; 2]> = witness_rows(witness).into_iter().map(|(name, value)| [name, value]).collect();
+        page.table(&["second witness", "value"], &rows);
+    }
     let bursts = if report.bursts.is_empty() { std::slice::from_ref(&report.first) } else { &report.bursts[..] };
     for (i, burst) in bursts.iter().enumerate() {
         if bursts.len() > 1 {

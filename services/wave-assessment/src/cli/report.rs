@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::crests::{CrestReport, crests};
 use super::shape::Shape;
+use super::witness::WitnessReport;
 use crate::table::Readings;
 
 /// A file's waves.
@@ -27,10 +28,13 @@ pub struct WavesReport {
     /// Every burst, where the record was cut.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub bursts: Vec<Burst>,
+    /// What a second witness says of the whole record, where there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub witness: Option<WitnessReport>,
 }
 
 impl WavesReport {
-    pub(super) fn new(readings: &Readings, mut bursts: Vec<Burst>) -> Self {
+    pub(super) fn new(readings: &Readings, mut bursts: Vec<Burst>, witness: Option<WitnessReport>) -> Self {
         let first = if bursts.len() == 1 { bursts.remove(0) } else { bursts[0].clone() };
         Self {
             time_column: readings.time_column.clone(),
@@ -38,6 +42,7 @@ impl WavesReport {
             unit: readings.unit.as_str(),
             first,
             bursts,
+            witness,
         }
     }
 }

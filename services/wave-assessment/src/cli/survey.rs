@@ -6,16 +6,20 @@ use halcyon_ocean::quality::RawSeries;
 use serde::Serialize;
 
 use super::verdict::{ReasonReport, VerdictReport};
-use super::{Burst, analyse};
+use super::witness::{Witness, WitnessReport};
+use super::{Burst, WavesError, analyse};
 use crate::config::Config;
 use crate::core::Assessor;
 
 /// Why a survey has no sea state.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, thiserror::Error)]
 pub enum SurveyError {
     /// The configured rig.
     #[error(transparent)]
     Rig(#[from] IdError),
+    /// The witness's file.
+    #[error(transparent)]
+    Witness(#[from] WavesError),
     /// No patch was good.
     #[error("no patch can be used{}", why.as_ref().map_or_else(String::new, |why| format!("; the first: {why}")))]
     NoPatch {
@@ -59,6 +63,9 @@ pub struct SeaReport {
     /// The elevation at the middle of the patches, as `halcyon waves` has it; absent where it is too short.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub centre: Option<Burst>,
+    /// What a second witness says of the elevation at the middle, where there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub witness: Option<WitnessReport>,
     /// What follows.
     pub verdict: VerdictReport,
 }
@@ -175,8 +182,8 @@ impl Survey {
     /// What all of them say.
     ///
     /// # Errors
-    /// [`SurveyError::NoPatch`]
-    pub fn report(mut self, segment_s: f64) -> Result<SeaReport, SurveyError> {
+    /// [`SurveyError::NoPatch`], or the witness's file
+    pub fn report(mut self, segment_s: f64, witness: Option<&Witness>) -> Result<SeaReport, SurveyError> {
         let sea = self.newest.and_then(|newest| self.assessor.conclude(newest));
         let Some(sea) = sea else { return Err(SurveyError::NoPatch { why: self.first_refusal }) };
         let seconds = |stamp: Stamp| stamp.as_nanos() as f64 * 1e-9;
@@ -190,6 +197,17 @@ impl Survey {
             passed: reason.passed,
             text: reason.text.clone(),
         });
+        let trace = RawSeries { stamp_s: &stamp_s, elevation_m: &elevation_m };
+        let witness = witness.map(|witness| WitnessReport::of(trace, witness, (0.05, f64::MAX))).transpose()?;
+        let mut verdict = VerdictReport {
+            state: sea.verdict.state.as_str(),
+            probability: sea.verdict.probability,
+            reasons: reasons.collect(),
+            valid_until: seconds(sea.verdict.valid_until),
+        };
+        if let Some(witness) = &witness {
+            witness.weigh(&mut verdict);
+        }
         Ok(SeaReport {
             patches: sea.patches,
             refused: self.refused,
@@ -210,12 +228,8 @@ impl Survey {
                 .map(|flag| ComplaintReport { test: flag.test.clone(), failed: flag.failed, reason: flag.text.clone() })
                 .collect(),
             centre,
-            verdict: VerdictReport {
-                state: sea.verdict.state.as_str(),
-                probability: sea.verdict.probability,
-                reasons: reasons.collect(),
-                valid_until: seconds(sea.verdict.valid_until),
-            },
+            witness,
+            verdict,
         })
     }
 }

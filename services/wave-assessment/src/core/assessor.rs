@@ -1,6 +1,8 @@
 //! From patch to sea state.
 
-use halcyon_model::{Directional, IdError, LocalPoint, RigId, SeaState, Stamp, SurfacePatch, Verdict, VerdictReason, VerdictState};
+use halcyon_model::{
+    Directional, IdError, LocalPoint, QualityFlag, RigId, SeaState, Stamp, SurfacePatch, Verdict, VerdictReason, VerdictState,
+};
 
 use super::ahead::calm;
 use super::direction::directional;
@@ -25,12 +27,20 @@ pub struct Assessor {
     /// When the last sea state was issued, whatever it rested on.
     issued: Option<Stamp>,
     verdict: VerdictState,
-    /// What was last found of directions, by patch time: they change slowly, and take a film to find.
-    direction: Option<(Stamp, Option<Directional>)>,
+    around: Option<Around>,
 }
 
-/// Directions are looked for once in so many seconds of patch time.
-const DIRECTION_PERIOD_S: f64 = 5.0;
+/// What changes slowly and takes whole grids to find.
+#[derive(Debug, Clone)]
+struct Around {
+    /// Patch time of it.
+    at: Stamp,
+    directional: Option<Directional>,
+    downwash: Option<QualityFlag>,
+}
+
+/// It is looked for once in so many seconds of patch time.
+const AROUND_PERIOD_S: f64 = 5.0;
 
 impl Assessor {
     /// An assessor that has seen nothing.
@@ -40,7 +50,7 @@ impl Assessor {
     pub fn new(config: Config) -> Result<Self, IdError> {
         let rig = RigId::new(&config.rig)?;
         let verdict = VerdictState::Inconclusive;
-        Ok(Self { config, rig, window: Window::default(), assessed: None, issued: None, verdict, direction: None })
+        Ok(Self { config, rig, window: Window::default(), assessed: None, issued: None, verdict, around: None })
     }
 
     /// Takes in one patch, at its place in time if it comes late or out of order. A sea state comes out once in `period_s` of patch time.
@@ -119,22 +129,19 @@ impl Assessor {
         self.assessed = None;
         self.issued = None;
         self.verdict = VerdictState::Inconclusive;
-        self.direction = None;
+        self.around = None;
     }
 
-    /// Looks for directions if it is time. Without waves above the noise there are none.
+    /// Looks for directions and rotor ripples if it is time. Without waves above the noise there are no directions.
     fn look_around(&mut self, newest: Stamp, interval_s: Option<f64>, statistics: Option<&Statistics>) {
-        let recent = self.direction.as_ref().is_some_and(|(at, _)| (0.0..DIRECTION_PERIOD_S).contains(&newest.seconds_since(*at)));
-        if recent {
+        if self.around.as_ref().is_some_and(|around| (0.0..AROUND_PERIOD_S).contains(&newest.seconds_since(around.at))) {
             return;
         }
-        let found = || {
+        let direction = || {
             let (statistics, interval_s) = (statistics?, interval_s?);
-            // Fewer seconds have no segment of a spectrum.
-            let (film, _) = film(&self.window, interval_s)?;
-            directional(&film, statistics.t_z_s?.value, statistics.freedom)
+            directional(&film(&self.window, interval_s)?, statistics.t_z_s?.value, statistics.freedom)
         };
-        self.direction = Some((newest, found()));
+        self.around = Some(Around { at: newest, directional: direction(), downwash: quality::downwash(&self.window) });
     }
 
     fn assess(&mut self, now: Stamp) -> Option<SeaState> {
@@ -150,6 +157,10 @@ impl Assessor {
             (hidden, series, statistics)
         });
         let (hidden, series, statistics) = measured.map_or((None, None, None), |(h, s, t)| (Some(h), Some(s), t));
+        self.look_around(newest, interval_s, statistics.as_ref());
+        let frames = self.window.frames();
+        let mean = |f: &dyn Fn(&super::window::Frame) -> f64| frames.iter().map(f).sum::<f64>() / frames.len() as f64;
+        let rings = self.around.as_ref().and_then(|around| around.downwash.clone());
         let evidence = Evidence {
             observed_s: series.as_ref().map_or(0.0, |s| s.observed_s),
             coverage: mean(&|f| f.coverage),
@@ -162,12 +173,13 @@ impl Assessor {
                 Some(Hidden::Unknown) | None => None,
             },
             quality: match (&series, &statistics) {
-                (Some(series), Some(statistics)) => quality::flags(series, statistics.above_noise),
-                _ => Vec::new(),
+                (Some(series), Some(statistics)) => {
+                    quality::flags(series, statistics.above_noise).into_iter().chain(rings).collect()
+                }
+                _ => rings.into_iter().collect(),
             },
             statistics,
         };
-        self.look_around(newest, interval_s, evidence.statistics.as_ref());
         let judgement = judge(&evidence, &self.config, self.verdict);
         self.verdict = judgement.state;
         Some(self.report(now, newest, position, series.as_ref(), Some(&evidence), judgement))
@@ -185,7 +197,7 @@ impl Assessor {
     ) -> SeaState {
         let statistics = evidence.and_then(|evidence| evidence.statistics.as_ref());
         let spectral = statistics.and_then(|s| s.spectral.as_ref());
-        let direction = self.direction.as_ref().and_then(|(_, found)| found.as_ref()).filter(|_| statistics.is_some());
+        let direction = self.around.as_ref().and_then(|around| around.directional.as_ref()).filter(|_| statistics.is_some());
         let calm = spectral
             .zip(direction)
             // What cannot be trusted is not forecast.

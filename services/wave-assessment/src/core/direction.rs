@@ -1,12 +1,18 @@
 //! Where the waves come from, by the window's film.
 
+use std::f64::consts::TAU;
+
 use halcyon_model::{Directional, Estimate};
-use halcyon_ocean::space::{Array, Film, Removed, Water};
+use halcyon_ocean::space::{Array, Film, Gauges, Removed, Water};
 
 /// Segments, seconds: a third of a minute resolves a peak and leaves a few of them in a window.
 const SEGMENT_S: f64 = 20.0;
 /// Frequencies looked at, over the mean zero-crossing one.
-const BAND: (f64, f64) = (0.6, 2.0);
+const BAND: (f64, f64) = (0.6, 1.5);
+/// And waves of at least so many cells: of shorter ones too little is left, and noise passes for them.
+const WAVE_CELLS_MIN: f64 = 4.0;
+/// Gauges are about so wide, metres.
+const GAUGE_M: f64 = 0.3;
 /// A direction this uncertain is none, radians.
 const UNCERTAIN_RAD: f64 = 0.5;
 
@@ -15,9 +21,11 @@ const UNCERTAIN_RAD: f64 = 0.5;
 pub(crate) fn directional(film: &Film, t_z_s: f64, freedom: f64) -> Option<Directional> {
     let segment = (SEGMENT_S.min(0.5 * film.duration_s()) * film.rate_hz()).round() as usize;
     let f_z_hz = 1.0 / t_z_s;
-    let band_hz = (BAND.0 * f_z_hz, (BAND.1 * f_z_hz).min(0.45 * film.rate_hz()));
     let water = Water::DEEP;
-    let spectrum = Array::new(Removed::Mean, segment, band_hz).spectrum(film, &water).ok()?;
+    let shortest_hz = water.omega_radps(TAU / (WAVE_CELLS_MIN * film.cell_m()), 0.0) / TAU;
+    let band_hz = (BAND.0 * f_z_hz, (BAND.1 * f_z_hz).min(0.45 * film.rate_hz()).min(shortest_hz));
+    let gauges = Gauges::Points { side: 4, cells: ((GAUGE_M / film.cell_m()).round() as usize).clamp(1, 3) };
+    let spectrum = Array { gauges, ..Array::new(Removed::Mean, segment, band_hz) }.spectrum(film, &water).ok()?;
     let overall = spectrum.overall()?;
     let (from_rad, spread_rad) = (overall.direction_from_rad(), overall.spread_rad());
     let (wavelength_peak_m, _) = spectrum.wavelengths_m(&water)?;

@@ -1,6 +1,6 @@
 //! The window's grids as a film: one piece of water, fixed in the local frame, at an even rate.
 
-use halcyon_model::{ElevationGrid, LocalPoint};
+use halcyon_model::ElevationGrid;
 use halcyon_ocean::space::{Film, Shape};
 
 use super::patch::cell;
@@ -59,8 +59,8 @@ impl Raster {
     }
 }
 
-/// The film of a window, each frame less its mean, and its south-west corner; `None` where frames have too little water in common.
-pub(crate) fn film(window: &Window, interval_s: f64) -> Option<(Film, LocalPoint)> {
+/// The film of a window, each frame less its mean; `None` where frames have too little water in common.
+pub(crate) fn film(window: &Window, interval_s: f64) -> Option<Film> {
     let frames = window.frames();
     let newest = frames.back()?;
     let cell_m = newest.raster.cell_m;
@@ -81,9 +81,11 @@ pub(crate) fn film(window: &Window, interval_s: f64) -> Option<(Film, LocalPoint
     let east = edge(&|r| r.corner[1] + r.cols as i64 - 1, false)?;
     let (rows, cols) = (usize::try_from(north - south + 1).ok()?, usize::try_from(east - west + 1).ok()?);
     let duration_s = -rasters.first()?.0;
-    let count = (duration_s / interval_s).round() as usize + 1;
+    // A window holds as many frames as were counted, whatever its stamps say.
+    let count = ((duration_s / interval_s).round() as usize + 1).min(2 * frames.len());
     let mut elevation_m = vec![f32::NAN; count * rows * cols];
     for (age_s, raster) in &rasters {
+        // Ages are negative: the newest frame is the last.
         let frame = count as f64 - 1.0 + (age_s / interval_s).round();
         if !(0.0..count as f64).contains(&frame) {
             continue;
@@ -99,6 +101,5 @@ pub(crate) fn film(window: &Window, interval_s: f64) -> Option<(Film, LocalPoint
         let mean = (sum / f64::from(seen.max(1))) as f32;
         frame.iter_mut().for_each(|z| *z -= mean);
     }
-    let corner = LocalPoint::new(south as f64 * cell_m, west as f64 * cell_m);
-    Some((Film::new(elevation_m, Shape { rows, cols, frames: count }, cell_m, 1.0 / interval_s).ok()?, corner))
+    Film::new(elevation_m, Shape { rows, cols, frames: count }, cell_m, 1.0 / interval_s).ok()
 }

@@ -178,13 +178,13 @@ mod tests {
         // Between cells as well as on them: Catmull-Rom's cubic is exact for a plane.
         let mut gauges = Gauges::default();
         let first = gauges.read(&patch(&grid(0.0, plane), 0.1, 0.0));
-        let moved = gauges.read(&patch(&grid(0.33, plane), 0.1, 0.0));
+        let moved = gauges.read(&patch(&grid(0.23, plane), 0.1, 0.0));
         for (a, b) in first.iter().zip(&moved) {
             let (a, b) = (a.unwrap(), b.unwrap());
             assert_eq!(a.gauge, b.gauge);
             assert!((a.samples[0].elevation_m - b.samples[0].elevation_m).abs() < 1e-6);
         }
-        // One metre north: the southern three (at 0.5 m) are left behind, the others stay.
+        // One metre north: the southern three (at 0.3 m) are left behind, the others stay.
         let further = gauges.read(&patch(&grid(1.0, plane), 0.1, 0.0));
         let kept = first.iter().zip(&further).filter(|(a, b)| a.unwrap().gauge == b.unwrap().gauge).count();
         assert_eq!(kept, 6);

@@ -29,5 +29,6 @@ mod window;
 
 pub use assessor::Assessor;
 pub use patch::PatchError;
+pub(crate) use quality::limits as quality_limits;
 pub(crate) use statistics::Statistics;
 pub(crate) use verdict::{Evidence, Judgement, judge};

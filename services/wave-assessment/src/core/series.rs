@@ -95,7 +95,8 @@ impl Series {
 
     /// Adds one run of readings; returns its length in seconds, 0 where it is too short.
     fn add(&mut self, window: &Window, hidden: &Hidden, slot: usize, run: &[(usize, f64)], level: usize) -> f64 {
-        let mut stretch = Stretch { slot, times_s: Vec::new(), elevation_m: Vec::new(), raw_m: Vec::new(), elevation_upper_m: Vec::new() };
+        let mut stretch =
+            Stretch { slot, times_s: Vec::new(), elevation_m: Vec::new(), raw_m: Vec::new(), elevation_upper_m: Vec::new() };
         let mut noise_m2 = 0.0;
         for (i, time_s) in run {
             let Some(reading) = window.frames()[*i].readings[slot] else { continue };

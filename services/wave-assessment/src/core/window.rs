@@ -47,10 +47,14 @@ pub(crate) struct Frame {
     pub frozen: bool,
 }
 
+/// So many of the grids that came last are kept whole: enough to see what rotors do to the water.
+const GRIDS: usize = 4;
+
 /// Frames, oldest first.
 #[derive(Debug, Default)]
 pub(crate) struct Window {
     frames: VecDeque<Frame>,
+    grids: VecDeque<ElevationGrid>,
     gauges: Gauges,
     fingerprint: Option<u64>,
 }
@@ -80,6 +84,10 @@ impl Window {
             frozen: fingerprint.is_some() && fingerprint == self.fingerprint,
         };
         self.fingerprint = fingerprint;
+        if self.grids.len() >= GRIDS {
+            self.grids.pop_front();
+        }
+        self.grids.push_back(grid.clone());
         let place = self.frames.partition_point(|old| old.stamp < frame.stamp);
         self.frames.insert(place, frame);
         if let Some((newest, centre)) = self.newest().map(|frame| (frame.stamp, frame.centre)) {
@@ -100,6 +108,11 @@ impl Window {
 
     pub(crate) fn frames(&self) -> &VecDeque<Frame> {
         &self.frames
+    }
+
+    /// The grids that came last, whole.
+    pub(crate) fn grids(&self) -> &VecDeque<ElevationGrid> {
+        &self.grids
     }
 
     pub(crate) fn newest(&self) -> Option<&Frame> {

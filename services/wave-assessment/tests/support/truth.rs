@@ -21,7 +21,8 @@ impl Truth {
     pub fn of(h_m0_m: f64, t_p_s: f64, baseline_m: f64) -> Self {
         let (mut m0, mut m2, mut slope) = (0.0, 0.0, 0.0);
         // Directions of cos-2s spreading with s = 10, by their density.
-        let directions: Vec<(f64, f64)> = (-90..=90).map(|d| f64::from(d) * TAU / 180.0).map(|a| (a, (0.5 * a).cos().powi(20))).collect();
+        let directions: Vec<(f64, f64)> =
+            (-90..=90).map(|d| f64::from(d) * TAU / 180.0).map(|a| (a, (0.5 * a).cos().powi(20))).collect();
         let weights: f64 = directions.iter().map(|(_, w)| w).sum();
         for (low_hz, width_hz, variance_m2) in bands(h_m0_m, t_p_s) {
             let f_hz = low_hz + 0.5 * width_hz;
@@ -58,7 +59,8 @@ impl Truth {
         let h_s_m = 4.0 * self.sigma_m;
         let h_tenth_m = self.h_tenth_m();
         let length_m = GRAVITY_MPS2 * self.t_z_s * self.t_z_s / TAU;
-        let hull = if length_m >= 4.0 * airframe.hull_length_m { 0.0 } else { 0.5 * h_tenth_m / (airframe.float_depth_m * kept) };
+        let hull =
+            if length_m >= 4.0 * airframe.hull_length_m { 0.0 } else { 0.5 * h_tenth_m / (airframe.float_depth_m * kept) };
         [
             h_s_m / config.h_s_m_max,
             h_tenth_m / config.h_tenth_m_max,
@@ -87,5 +89,8 @@ impl Truth {
 
 /// ∫ 1 − (1 − exp(−x²/2))ⁿ dx.
 fn rayleigh_largest(n: f64) -> f64 {
-    (0..4000).map(|i| (f64::from(i) + 0.5) * 0.0025).map(|x| (1.0 - (1.0 - (-0.5 * x * x).exp()).powf(n.max(1.0))) * 0.0025).sum()
+    (0..4000)
+        .map(|i| (f64::from(i) + 0.5) * 0.0025)
+        .map(|x| (1.0 - (1.0 - (-0.5 * x * x).exp()).powf(n.max(1.0))) * 0.0025)
+        .sum()
 }

@@ -1,7 +1,5 @@
 //! Keeping a slot beside a leader whose states can't be trusted, or that stands at the least separation.
 
-use std::time::Instant;
-
 use halcyon_model::{Activity, LocalPoint, Task, VehicleState};
 use nalgebra::Vector3;
 
@@ -59,20 +57,4 @@ fn nonsense_from_the_leader_never_reaches_a_setpoint() {
             }
         }
     }
-}
-
-/// A setpoint takes at most 50 µs; here even unoptimised, with other work on the machine.
-#[test]
-fn a_setpoint_takes_microseconds() {
-    let (mut world, _) = in_formation(7.0);
-    let mut least_us = f64::INFINITY;
-    for step in 1..200 {
-        let now = world.now.plus_secs_f64(0.001 * f64::from(step));
-        let begin = Instant::now();
-        let outputs = world.executors[1].step(now);
-        least_us = least_us.min(begin.elapsed().as_secs_f64() * 1e6);
-        assert!(outputs.iter().any(|output| matches!(output, Output::Setpoint(_))));
-    }
-    println!("{least_us:.1} µs");
-    assert!(least_us < 50.0, "{least_us} µs");
 }

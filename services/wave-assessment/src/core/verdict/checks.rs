@@ -58,7 +58,8 @@ impl Checks {
         } else {
             (Outcome::Failed, "not surely under")
         };
-        let target = if margin < 1.0 { format!(" (by {:.0} % to become safe)", self.hysteresis * 100.0) } else { String::new() };
+        let target =
+            if margin < 1.0 { format!(" (by {:.0} % to become safe)", self.hysteresis * 100.0) } else { String::new() };
         let text = format!("{what} {value:.3} {unit} ({low:.3} to {high:.3}), {verb} the limit of {limit:.3} {unit}{target}");
         self.add(name, outcome, text);
         let under = probability_under(measured, limit);

@@ -120,11 +120,7 @@ fn waves(checks: &mut Checks, statistics: &Statistics, interval_s: Option<f64>, 
     // A tenth more to become safe, so that a wave more or less in the window does not make the verdict flicker.
     let waves_min = f64::from(config.waves_min) * if previous == VerdictState::Safe { 1.0 } else { 1.0 + config.hysteresis };
     if statistics.above_noise {
-        checks.known(
-            "waves",
-            waves as f64 >= waves_min,
-            format!("{waves} waves at one gauge, {waves_min:.0} needed"),
-        );
+        checks.known("waves", waves as f64 >= waves_min, format!("{waves} waves at one gauge, {waves_min:.0} needed"));
     } else {
         let high_m = statistics.h_m0_m.high;
         checks.add(
@@ -160,13 +156,9 @@ fn vehicle(checks: &mut Checks, statistics: &Statistics, config: &Config, airfra
     let landing_s = config.landing_s;
     let kept = 1.0 - config.airframe.margin;
     match statistics.tilt_rad(landing_s) {
-        Some(tilt) => checks.limit(
-            "tilt",
-            "expected steepest water of the landing",
-            "rad",
-            tilt,
-            airframe.tip_angle_rad * kept,
-        ),
+        Some(tilt) => {
+            checks.limit("tilt", "expected steepest water of the landing", "rad", tilt, airframe.tip_angle_rad * kept)
+        }
         None => checks.unknown("tilt", "slope could not be measured"),
     }
     let length = statistics.wavelength_m();
@@ -185,11 +177,7 @@ fn vehicle(checks: &mut Checks, statistics: &Statistics, config: &Config, airfra
     }
     let descent_mps = config.airframe.descent_mps;
     let rise = statistics.rise_mps(landing_s);
-    let meeting = Estimate {
-        value: rise.value + descent_mps,
-        low: rise.low + descent_mps,
-        high: rise.high + descent_mps,
-    };
+    let meeting = Estimate { value: rise.value + descent_mps, low: rise.low + descent_mps, high: rise.high + descent_mps };
     checks.limit(
         "touchdown_speed",
         "expected fastest meeting of water and floats",
