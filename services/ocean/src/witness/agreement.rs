@@ -30,7 +30,8 @@ pub enum Difference {
     Height(Ratio),
     /// The mean zero-crossing period of a over b is not 1.
     Period(Ratio),
-    /// 95 % intervals of the peak periods, seconds, have nothing in common: the thesis's ultrasonic sensor at 0.20 Hz (figure 5-28).
+    /// 95 % intervals of the peak periods, seconds, have nothing in common: the thesis's ultrasonic sensor at 0.20 Hz (figure
+    /// 5-28).
     Peak {
         /// The series under test.
         a_s: Interval,

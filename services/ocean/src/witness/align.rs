@@ -37,9 +37,9 @@ pub(super) struct Pair {
 }
 
 impl Pair {
-    /// At the rate of the slower series over the time that both have, with `b` taken `lag_s` later than `a`. Readings further apart than
-    /// `gap_intervals` of their own series' usual interval are a gap: splines end before it and start anew after it, so that nothing
-    /// is extrapolated or made up.
+    /// At the rate of the slower series over the time that both have, with `b` taken `lag_s` later than `a`. Readings further
+    /// apart than `gap_intervals` of their own series' usual interval are a gap: splines end before it and start anew after it,
+    /// so that nothing is extrapolated or made up.
     pub(super) fn of(a: &Ordered, b: &Ordered, lag_s: f64, gap_intervals: f64) -> Result<Self, CompareError> {
         let interval_s = a.interval_s.max(b.interval_s);
         let ((a_from_s, a_to_s), (b_from_s, b_to_s)) = (span_s(a), span_s(b));

@@ -18,7 +18,8 @@ pub struct Options {
     pub max_lag_s: f64,
     /// Readings further apart than this many of their series' usual interval are a gap, which is left out.
     pub gap_intervals: f64,
-    /// Where waves are, hertz. The upper end is lowered to a quarter of the common rate: splines keep 97 % of a wave of four samples.
+    /// Where waves are, hertz. The upper end is lowered to a quarter of the common rate: splines keep 98.6 % of a wave of four
+    /// samples.
     pub band_hz: Interval,
     /// Standard deviation of a single reading's noise of the series under test, metres; white.
     pub noise_a_m: f64,
@@ -83,11 +84,11 @@ pub struct Comparison {
     pub common_s: f64,
     /// That, as a share of the shorter series' span.
     pub common_share: f64,
-    /// How much later b comes, seconds; `None` where the two do not correlate beyond chance (four deviations of what unrelated seas give) or
-    /// the highest correlation is at an end of the search: then they are compared as their stamps are.
+    /// How much later b comes, seconds; `None` where the two do not correlate beyond chance (four deviations of what unrelated
+    /// seas give) or the highest correlation is at an end of the search: then they are compared as their stamps are.
     pub lag_s: Option<f64>,
-    /// The lowest correlation of the search where it is clearly stronger than the highest, beyond chance: one of the two has its sign
-    /// wrong, as a range taken for an elevation. No lag is taken then.
+    /// The lowest correlation of the search where it is clearly stronger than the highest, beyond chance: one of the two has its
+    /// sign wrong, as a range taken for an elevation. No lag is taken then.
     pub upside_down: Option<f64>,
     /// Pearson's correlation after the lag.
     pub correlation: f64,

@@ -32,20 +32,20 @@ pub struct AtPeak {
     pub coherence: f64,
     /// Independent estimates in it.
     pub averages: f64,
-    /// What γ² of two unrelated records stays under with 95 % probability: 1 − 0.05^(1/(n − 1)) (Bendat and Piersol 2010, 9.2).
+    /// What γ² of two unrelated records stays under with 95 % probability: 1 − 0.05^(1/(n − 1)) (Bendat and Piersol 2010, chapter 9).
     pub coherence_by_chance: f64,
-    /// Gain from b to a, |S_ab|/(S_bb − the noise of b): 1 for sensors of the same scale. Noise in b that nobody gave lowers it as it does a
-    /// slope, but only by what lies under the peak.
+    /// Gain from b to a, |S_ab|/(S_bb − the noise of b): 1 for sensors of the same scale. Noise in b that nobody gave lowers it
+    /// as it does a slope, but only by what lies under the peak.
     pub gain: f64,
-    /// Its 95 % interval: ± t √((1 − γ²)/(2n − 2))·√(S_aa/S_bb) (Bendat and Piersol 2010, 9.2.3, for small n with Student's t).
+    /// Its 95 % interval: ± t √((1 − γ²)/(2n − 2))·√(S_aa/S_bb) (Bendat and Piersol 2010, chapter 9, for small n with Student's t).
     pub gain_95: Interval,
     /// Phase of b behind a, radians; what the lag has left over.
     pub phase_rad: f64,
 }
 
 impl CrossSpectrum {
-    /// Of pairs of equally long stretches at `rate_hz`, in segments of `segment_samples`; stretches shorter than that add nothing.
-    /// `None` where none is long enough or a segment has fewer than four samples.
+    /// Of pairs of equally long stretches at `rate_hz`, in segments of `segment_samples`; stretches shorter than that add
+    /// nothing. `None` where none is long enough or a segment has fewer than four samples.
     #[must_use]
     pub fn of(stretches: &[(&[f64], &[f64])], segment_samples: usize, rate_hz: f64) -> Option<Self> {
         let n = segment_samples;
@@ -110,8 +110,8 @@ impl CrossSpectrum {
         (1..self.aa_m2_per_hz.len()).filter(move |line| (low_hz..=high_hz).contains(&(*line as f64 * df_hz)))
     }
 
-    /// About the highest line of the geometric mean of both spectra within `band_hz`, with the density of b's noise; `None` where they share
-    /// no energy, b no more than its noise, or there are fewer than two independent estimates.
+    /// About the highest line of the geometric mean of both spectra within `band_hz`, with the density of b's noise; `None` where
+    /// they share no energy, b no more than its noise, or there are fewer than two independent estimates.
     #[must_use]
     pub fn at_peak(&self, band_hz: Interval, noise_b_m2_per_hz: f64) -> Option<AtPeak> {
         let shared = |line: usize| (self.aa_m2_per_hz[line] * self.bb_m2_per_hz[line]).sqrt();

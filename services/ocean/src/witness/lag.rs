@@ -21,8 +21,8 @@ pub(super) struct Best {
 
 /// Within ± `max_lag_s`; trends must be off. `None` where nothing correlates: too few samples in common, or one of them flat.
 ///
-/// The highest of the sampled correlations and its neighbours give a parabola, whose top is the lag between samples: within 0.1 % of a
-/// sample for ten samples a wave, as the correlation of waves is a cosine near its top.
+/// The highest of the sampled correlations and its neighbours give a parabola, whose top is the lag between samples: within 1 %
+/// of a sample for ten samples a wave, as the correlation of waves is a cosine near its top.
 pub(super) fn best(pair: &Pair, max_lag_s: f64) -> Result<Option<Best>, CompareError> {
     let n = pair.samples();
     // Half of the samples must remain at the largest lag.

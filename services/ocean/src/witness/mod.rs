@@ -5,7 +5,7 @@
 //! | module | holds |
 //! |---|---|
 //! | [`mod@compare`] | two series of different rates, gaps and clocks, compared |
-//! | [`agreement`] | whether they agree within what chance and the sensors leave open |
+//! | [`mod@agreement`] | whether they agree within what chance and the sensors leave open |
 //! | [`ratio`] | intervals of ratios of two records of the same, partly the same, or different waves |
 //! | [`regression`] | slopes where one or both have errors |
 //! | [`cross`] | auto and cross spectra, coherence, gain |
@@ -99,12 +99,13 @@ pub enum CompareError {
     },
 }
 
-/// Surface elevation, metres above the level that `height_m` is counted from, of a range measured along the vehicle's own downward axis:
-/// η = h − R cos φ cos θ (thesis, equation 7-1, after Christensen et al. 2013).
+/// Surface elevation, metres above the level that `height_m` is counted from, of a range measured along the vehicle's own
+/// downward axis: η = h − R cos φ cos θ (thesis, equation 7-1, after Christensen et al. 2013).
 ///
-/// `range_m` is the range, metres; `height_m` the sensor's height above the mean level, metres; roll and pitch are the vehicle's, radians.
-/// cos φ cos θ is exactly the vertical share of the body's downward axis with the usual order of angles (yaw, pitch, roll), whatever the
-/// yaw. The spot itself lies R √(1 − cos² φ cos² θ) from under the sensor: waves much shorter than that are seen elsewhere and elsewhen.
+/// `range_m` is the range, metres; `height_m` the sensor's height above the mean level, metres; roll and pitch are the vehicle's,
+/// radians. cos φ cos θ is exactly the vertical share of the body's downward axis with the usual order of angles (yaw, pitch,
+/// roll), whatever the yaw. The spot itself lies R √(1 − cos² φ cos² θ) from under the sensor: waves much shorter than that are
+/// seen elsewhere and elsewhen.
 ///
 /// NaN for what cannot be: a range that is not above zero, anything that is not finite, a beam that is level or looks up.
 #[must_use]

@@ -1,17 +1,17 @@
 //! How far two records' heights and periods may differ by chance, when they saw the same, partly the same, or different waves.
 //!
 //! To first order the logarithm of a moment mₙ = ∫ fⁿ S df changes by ∫ (fⁿ/mₙ) δS df, and of Gaussian seas over a time T
-//! cov(δS_a, δS_b) = |S_ab|²/T at a frequency and none between two (Bendat and Piersol 2010, 8.5 and 9.1). With a weight w(f), 1/m0
-//! for heights and 1/m0 − f²/m2 for periods, of each record,
+//! cov(δS_a, δS_b) = |S_ab|²/T at a frequency and none between two (Bendat and Piersol 2010, 8.5 and chapter 9). With a weight w(f),
+//! 1/m0 for heights and 1/m0 − f²/m2 for periods, of each record,
 //!
 //! > var(∫ w_a δS_a df − ∫ w_b δS_b df) = (1/T) ∫ (w_a² S_a² + w_b² S_b² − 2 w_a w_b |S_ab|²) df.
 //!
-//! For two records of one spectrum whose coherence γ² is the same everywhere that is 2(1 − γ²) ∫ S² df/(T m0²) = 4(1 − γ²)/ν for the ratio
-//! of the variances, with ν = 2 T m0²/∫ S² df the degrees of freedom of either, and (1 − γ²)/ν for the ratio of H_m0, which has half the
-//! logarithm: unrelated records differ as two chi-square variables do, those of the same waves not at all.
+//! For two records of one spectrum whose coherence γ² is the same everywhere that is 2(1 − γ²) ∫ S² df/(T m0²) = 4(1 − γ²)/ν for
+//! the ratio of the variances, with ν = 2 T m0²/∫ S² df the degrees of freedom of either, and (1 − γ²)/ν for the ratio of H_m0,
+//! which has half the logarithm: unrelated records differ as two chi-square variables do, those of the same waves not at all.
 //!
-//! A sensor's noise is part of its spectrum, so that its scatter is in there: it lowers γ². Its mean is taken off the moments, and it is
-//! known to 30 % only, which is added.
+//! A sensor's noise is part of its spectrum, so that its scatter is in there: it lowers γ². Its mean is taken off the moments,
+//! and it is known to 30 % only, which is added.
 
 use super::cross::CrossSpectrum;
 use crate::interval::{CLAIMED, Interval, NORMAL_95};
@@ -109,8 +109,9 @@ pub(super) struct Both<'a> {
 impl Both<'_> {
     /// Variance of ∫ w_a δS_a df − ∫ w_b δS_b df.
     ///
-    /// Lines of n independent estimates have squares too high by 1/n, and cross spectra that are none have |S_ab|² = S_a S_b/n: of X = |S_ab|²
-    /// and Y = S_a S_b as estimated, (X − Y/n)/(1 − 1/n²) is without either bias. It may be negative at a line, but not on the whole.
+    /// Lines of n independent estimates have squares too high by 1/n, and cross spectra that are none have |S_ab|² = S_a S_b/n:
+    /// of X = |S_ab|² and Y = S_a S_b as estimated, (X − Y/n)/(1 − 1/n²) is without either bias. It may be negative at a line,
+    /// but not on the whole.
     fn variance(&self, a: impl Fn(f64) -> f64, b: impl Fn(f64) -> f64) -> f64 {
         let n = self.cross.averages.max(1.5);
         let sum: f64 = self

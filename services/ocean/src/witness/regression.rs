@@ -11,14 +11,14 @@ pub struct Regression {
     pub r_squared: f64,
     /// Reduced major axis: σ_a/σ_b with the correlation's sign. Right where both have errors in the proportion of their scatter.
     pub slope_reduced: f64,
-    /// Deming's: both have errors, of known proportion (the sensors' noise variances); right where those are. The reduced major axis
-    /// where both noises are given as zero.
+    /// Deming's: both have errors, of known proportion (the sensors' noise variances); right where those are. The reduced major
+    /// axis where both noises are given as zero.
     pub slope_deming: f64,
 }
 
 impl Regression {
-    /// Of pairs (a, b), metres, with the noise of each, standard deviations in metres. `None` for fewer than three pairs or where one
-    /// does not vary.
+    /// Of pairs (a, b), metres, with the noise of each, standard deviations in metres. `None` for fewer than three pairs or where
+    /// one does not vary.
     #[must_use]
     pub fn of(pairs: impl Iterator<Item = (f64, f64)> + Clone, noise_a_m: f64, noise_b_m: f64) -> Option<Self> {
         let count = pairs.clone().count();
