@@ -339,7 +339,7 @@ fn a_clock_set_back_starts_anew() {
     assert_eq!((found.verdict.state, found.patches), (VerdictState::Inconclusive, 1));
 }
 
-/// Bounds that touch a limit: safe is kept until they reach it, and not entered until they are a tenth under it.
+/// Bounds that touch a limit: safe is kept until they reach it, and not entered until they are well under it.
 #[test]
 fn the_verdict_does_not_flicker() {
     let patches = Camera::default().film(&Sea::jonswap(0.05, 1.3, 9), 900);

@@ -125,7 +125,8 @@ pub(super) fn witness_rows(report: &cli::WitnessReport) -> Vec<(String, String)>
     );
     add("H_m0 of both", format!("{} and {} m", four(c.h_m0_a_m), four(c.h_m0_b_m)));
     if let (Some(value), low, high) = (c.height_ratio, c.height_ratio_low, c.height_ratio_high) {
-        add("ratio of heights", with_bounds(value, low, high, ""));
+        let bounds = low.zip(high).map(|(low, high)| format!(" (95 %: {} to {})", four(low), four(high)));
+        add("ratio of heights", format!("{}{}", four(value), bounds.unwrap_or_default()));
     }
     add("regression: slope, reduced axis, R²", format!("{}, {}, {}", four(c.slope), four(c.slope_reduced), four(c.r_squared)));
     add("bias, RMS difference", format!("{} m, {} m", four(c.bias_m), four(c.rmse_m)));

@@ -56,6 +56,9 @@ pub enum LabError {
     /// A picture of a result.
     #[error("a picture could not be drawn: {0}")]
     Draw(String),
+    /// A formation flight.
+    #[error(transparent)]
+    Flight(#[from] halcyon_vehicle_link::experiment::FlightError),
     /// A temporary file.
     #[error("a temporary file could not be written")]
     Temporary(#[from] std::io::Error),

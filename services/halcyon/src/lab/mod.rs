@@ -15,6 +15,7 @@ mod dense;
 mod exhibit;
 mod features;
 mod flat;
+mod formation;
 mod parts;
 mod pictures;
 mod speed;
@@ -132,6 +133,12 @@ pub const EXPERIMENTS: &[Experiment] = &[
         ],
         about: "The wave tank: stereo, ultrasonic sensor and wave probe in time and frequency",
         run: tank::run,
+    },
+    Experiment {
+        name: "formation",
+        shows: &["table 6-6", "table 6-7", "table 6-8", "table 6-9"],
+        about: "A follower at 5 and 7 m in wind, by the thesis's law and others: square and sweep of the heading",
+        run: formation::run,
     },
     Experiment {
         name: "air",

@@ -8,6 +8,9 @@ use serde::Serialize;
 /// Noise is looked for from this many peak frequencies on: there, a sea has no more than its tail.
 const NOISE_FROM_PEAKS: f64 = 2.5;
 
+/// Systems of a smaller share of the variance are what is left of noise and drift.
+const SYSTEM_SHARE_MIN: f64 = 0.01;
+
 /// As `--json` prints it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Shape {
@@ -133,6 +136,7 @@ impl Shape {
             h_m0_less_noise_m: noise.map(|noise| 4.0 * noise.moment(spectrum, 0, band_hz).value.max(0.0).sqrt()),
             systems: systems(&clean, &scatter, band_hz)
                 .iter()
+                .filter(|system| system.statistics.m0_m2 >= SYSTEM_SHARE_MIN * clean.moment(0, band_hz.0, band_hz.1))
                 .map(|system| System {
                     kind: kind(system.kind),
                     h_m0_m: system.statistics.h_m0_m,
