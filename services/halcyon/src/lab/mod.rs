@@ -206,10 +206,11 @@ mod tests {
         assert_eq!(names(&["chapter 3"]), ["calibration"]);
         assert_eq!(names(&[]).len(), EXPERIMENTS.len());
         assert_eq!(select(&["table 5-17".to_owned()]).unwrap_err(), "table 5-17", "5-17 is a figure");
-        assert!(select(&["chapter 6".to_owned()]).is_err() && select(&[String::new()]).is_err());
+        assert_eq!(names(&["chapter 6"]), ["formation"]);
+        assert!(select(&["chapter 8".to_owned()]).is_err() && select(&[String::new()]).is_err());
     }
 
-    /// Every table and figure of chapters 3 to 5 that holds a result. The others are photographs of apparatus and drawings.
+    /// Every table and figure of chapters 3 to 5 that holds a result, and the flights' tables. The others are photographs of apparatus and drawings.
     #[test]
     fn nothing_of_the_thesis_is_left_out() {
         let figures = [
@@ -217,7 +218,7 @@ mod tests {
             "4-24", "4-25", "5-2", "5-3", "5-4", "5-5", "5-6", "5-8", "5-9", "5-10", "5-15", "5-16", "5-17", "5-18", "5-19",
             "5-20", "5-22", "5-23", "5-24", "5-25", "5-26", "5-27", "5-28", "5-29", "5-30",
         ];
-        let tables = ["3-1", "4-2", "4-3", "5-1", "5-2"];
+        let tables = ["3-1", "4-2", "4-3", "5-1", "5-2", "6-6", "6-7", "6-8", "6-9"];
         for (kind, numbers) in [("figure", &figures[..]), ("table", &tables[..])] {
             for number in numbers {
                 let wanted = format!("{kind} {number}");
