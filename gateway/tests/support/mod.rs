@@ -199,6 +199,12 @@ pub fn vehicle(id: &str, age_s: f64) -> VehicleState {
         activity: Activity::Following { settled: true, slot_error_m: 0.25 },
         plan_generation: 7,
         touchdown: None,
+        acceleration_ned_mps2: None,
+        intent: None,
+        range: None,
+        ages: halcyon_model::Ages::default(),
+        link: None,
+        firmware: None,
     }
 }
 

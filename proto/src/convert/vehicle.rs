@@ -1,4 +1,6 @@
-use halcyon_model::{Activity, Fix, FlightMode, LandedState, Role, SimTruth, VehicleState};
+use halcyon_model::{
+    Activity, Ages, Firmware, Fix, FlightMode, Intent, LandedState, LinkQuality, Range, Role, SimTruth, Stamp, VehicleState,
+};
 
 use super::geo::{geodetic_from, geodetic_to, point_from, point_to, rotation_from, rotation_to, vector_from, vector_to};
 use crate::field::{
@@ -82,6 +84,72 @@ fn fix_from(proto: v1::Fix) -> Result<Fix, FieldError> {
     })
 }
 
+fn intent_to(intent: &Intent) -> v1::Intent {
+    v1::Intent {
+        stamp_ns: intent.stamp.as_nanos(),
+        position_ned_m: Some(vector_to(&intent.position_ned_m)),
+        velocity_ned_mps: Some(vector_to(&intent.velocity_ned_mps)),
+        acceleration_ned_mps2: Some(vector_to(&intent.acceleration_ned_mps2)),
+    }
+}
+
+fn intent_from(proto: v1::Intent) -> Result<Intent, FieldError> {
+    Ok(Intent {
+        stamp: Stamp::from_nanos(proto.stamp_ns),
+        position_ned_m: required("position_ned_m", proto.position_ned_m, vector_from)?,
+        velocity_ned_mps: required("velocity_ned_mps", proto.velocity_ned_mps, vector_from)?,
+        acceleration_ned_mps2: required("acceleration_ned_mps2", proto.acceleration_ned_mps2, vector_from)?,
+    })
+}
+
+fn range_from(proto: v1::Range) -> Result<Range, FieldError> {
+    Ok(Range { stamp: Stamp::from_nanos(proto.stamp_ns), distance_m: non_negative("distance_m", proto.distance_m)? })
+}
+
+fn ages_to(ages: &Ages) -> v1::Ages {
+    let Ages { mode_s, attitude_s, landed_s, battery_s, fix_s, estimator_s, home_s } = *ages;
+    v1::Ages { mode_s, attitude_s, landed_s, battery_s, fix_s, estimator_s, home_s }
+}
+
+fn ages_from(proto: v1::Ages) -> Result<Ages, FieldError> {
+    Ok(Ages {
+        mode_s: optionally("mode_s", proto.mode_s, non_negative)?,
+        attitude_s: optionally("attitude_s", proto.attitude_s, non_negative)?,
+        landed_s: optionally("landed_s", proto.landed_s, non_negative)?,
+        battery_s: optionally("battery_s", proto.battery_s, non_negative)?,
+        fix_s: optionally("fix_s", proto.fix_s, non_negative)?,
+        estimator_s: optionally("estimator_s", proto.estimator_s, non_negative)?,
+        home_s: optionally("home_s", proto.home_s, non_negative)?,
+    })
+}
+
+fn link_to(link: &LinkQuality) -> v1::LinkQuality {
+    let LinkQuality { loss, round_trip_s, received, is_signed } = *link;
+    v1::LinkQuality { loss, round_trip_s, received, is_signed }
+}
+
+fn link_from(proto: v1::LinkQuality) -> Result<LinkQuality, FieldError> {
+    Ok(LinkQuality {
+        loss: fraction("loss", proto.loss)?,
+        round_trip_s: optionally("round_trip_s", proto.round_trip_s, non_negative)?,
+        received: proto.received,
+        is_signed: proto.is_signed,
+    })
+}
+
+fn firmware_to(firmware: &Firmware) -> v1::Firmware {
+    let Firmware { autopilot, vehicle, version } = firmware.clone();
+    v1::Firmware { autopilot, vehicle, version }
+}
+
+fn firmware_from(proto: v1::Firmware) -> Result<Firmware, FieldError> {
+    Ok(Firmware {
+        autopilot: text("autopilot", proto.autopilot)?,
+        vehicle: text("vehicle", proto.vehicle)?,
+        version: text("version", proto.version)?,
+    })
+}
+
 impl Wire for VehicleState {
     const NAME: &'static str = "VehicleState";
     type Proto = v1::VehicleState;
@@ -116,6 +184,15 @@ impl Wire for VehicleState {
             activity: Some(activity_to(&self.activity)),
             plan_generation: self.plan_generation,
             touchdown: self.touchdown.as_ref().map(point_to),
+            acceleration_ned_mps2: self.acceleration_ned_mps2.as_ref().map(vector_to),
+            intent: self.intent.as_ref().map(intent_to),
+            range: self
+                .range
+                .as_ref()
+                .map(|range| v1::Range { stamp_ns: range.stamp.as_nanos(), distance_m: range.distance_m }),
+            ages: Some(ages_to(&self.ages)),
+            link: self.link.as_ref().map(link_to),
+            firmware: self.firmware.as_ref().map(firmware_to),
         }
     }
 
@@ -142,6 +219,12 @@ impl Wire for VehicleState {
             activity: required("activity", proto.activity, activity_from)?,
             plan_generation: proto.plan_generation,
             touchdown: optional("touchdown", proto.touchdown, point_from)?,
+            acceleration_ned_mps2: optional("acceleration_ned_mps2", proto.acceleration_ned_mps2, vector_from)?,
+            intent: optional("intent", proto.intent, intent_from)?,
+            range: optional("range", proto.range, range_from)?,
+            ages: optional("ages", proto.ages, ages_from)?.unwrap_or_default(),
+            link: optional("link", proto.link, link_from)?,
+            firmware: optional("firmware", proto.firmware, firmware_from)?,
         })
     }
 }

@@ -92,6 +92,12 @@ fn state(truth: &SimTruth) -> VehicleState {
         activity: Activity::Idle,
         plan_generation: 0,
         touchdown: None,
+        acceleration_ned_mps2: None,
+        intent: None,
+        range: None,
+        ages: halcyon_model::Ages::default(),
+        link: None,
+        firmware: None,
     }
 }
 

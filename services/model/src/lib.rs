@@ -48,4 +48,6 @@ pub use stereo::{
     CameraIntrinsics, ElevationGrid, Image, Plane, PoseAtExposure, Preview, RigCalibration, StereoPair, SurfacePatch,
 };
 pub use time::Stamp;
-pub use vehicle::{Activity, Fix, FlightMode, LandedState, Role, SimTruth, VehicleState};
+pub use vehicle::{
+    Activity, Ages, Firmware, Fix, FlightMode, Intent, LandedState, LinkQuality, Range, Role, SimTruth, VehicleState,
+};

@@ -170,6 +170,65 @@ pub enum Activity {
     PilotControl,
 }
 
+/// Where a vehicle means to be: the setpoint that its guidance last sent.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Intent {
+    /// For when.
+    pub stamp: Stamp,
+    /// Position in the fleet's local frame, metres.
+    pub position_ned_m: Vector3<f64>,
+    /// Velocity, metres per second.
+    pub velocity_ned_mps: Vector3<f64>,
+    /// Acceleration, metres per second squared.
+    pub acceleration_ned_mps2: Vector3<f64>,
+}
+
+/// A downward rangefinder's reading.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Range {
+    /// When.
+    pub stamp: Stamp,
+    /// Along the body's down axis, metres.
+    pub distance_m: f64,
+}
+
+/// How long ago each part of the state was heard, seconds; `None` if never.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[allow(missing_docs, reason = "each is named after what was heard")]
+pub struct Ages {
+    pub mode_s: Option<f64>,
+    pub attitude_s: Option<f64>,
+    pub landed_s: Option<f64>,
+    pub battery_s: Option<f64>,
+    pub fix_s: Option<f64>,
+    pub estimator_s: Option<f64>,
+    pub home_s: Option<f64>,
+}
+
+/// The MAVLink link to the autopilot.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LinkQuality {
+    /// Share of the autopilot's frames lost lately, 0 to 1.
+    pub loss: f64,
+    /// There and back, seconds, by TIMESYNC.
+    pub round_trip_s: Option<f64>,
+    /// Frames since the link was opened.
+    pub received: u64,
+    /// What it says is signed with our key.
+    pub is_signed: bool,
+}
+
+/// What flies the vehicle.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Firmware {
+    /// Such as `ArduPilot` or `PX4`.
+    pub autopilot: String,
+    /// Such as `quadrotor`.
+    pub vehicle: String,
+    /// Such as `4.6.0`; empty if it does not say.
+    pub version: String,
+}
+
 /// A vehicle's state: latest value wins.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VehicleState {
@@ -215,6 +274,18 @@ pub struct VehicleState {
     pub plan_generation: u64,
     /// Where it touched down for its last landing task, by its own position.
     pub touchdown: Option<LocalPoint>,
+    /// Acceleration without gravity, metres per second squared, if it is measured.
+    pub acceleration_ned_mps2: Option<Vector3<f64>>,
+    /// Where it means to be, while Halcyon's guidance flies it.
+    pub intent: Option<Intent>,
+    /// Downward rangefinder; `None` without one, or out of its range.
+    pub range: Option<Range>,
+    /// How old each part is.
+    pub ages: Ages,
+    /// The link to the autopilot.
+    pub link: Option<LinkQuality>,
+    /// What flies it.
+    pub firmware: Option<Firmware>,
 }
 
 /// The simulator's truth about one vehicle. Exists only in simulation; nothing that flies may read it.

@@ -245,6 +245,12 @@ impl FakeVehicle {
             activity: self.activity.clone(),
             plan_generation: self.generation,
             touchdown: self.touchdown,
+            acceleration_ned_mps2: None,
+            intent: None,
+            range: None,
+            ages: halcyon_model::Ages::default(),
+            link: None,
+            firmware: None,
         }
     }
 }

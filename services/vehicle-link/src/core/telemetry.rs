@@ -254,6 +254,12 @@ impl Telemetry {
             activity: Activity::Idle,
             plan_generation: 0,
             touchdown: None,
+            acceleration_ned_mps2: None,
+            intent: None,
+            range: None,
+            ages: halcyon_model::Ages::default(),
+            link: None,
+            firmware: None,
         })
     }
 }

@@ -219,6 +219,12 @@ pub(super) mod tests {
             activity: Activity::Holding { settled: true },
             plan_generation: 0,
             touchdown: None,
+            acceleration_ned_mps2: None,
+            intent: None,
+            range: None,
+            ages: halcyon_model::Ages::default(),
+            link: None,
+            firmware: None,
         }
     }
 
