@@ -1,7 +1,7 @@
 use halcyon_model::{Assignment, Clearance, DispatchPlan, Slot, Stamp, Task};
 
 use super::geo::{point_from, point_to};
-use super::sea::{verdict_state_from, verdict_state_to};
+use super::sea::{verdict_state_from, verdict_state_to, window_from, window_to};
 use crate::field::{
     FieldError, Within, finite, header, id, optional, optional_id, optionally, positive, required, unspecified,
 };
@@ -19,11 +19,15 @@ pub(super) fn slot_from(proto: v1::Slot) -> Result<Slot, FieldError> {
     })
 }
 
+/// More calm windows than this are not taken: the soonest count.
+const WINDOWS_MAX: usize = 8;
+
 fn clearance_from(proto: v1::Clearance) -> Result<Clearance, FieldError> {
     Ok(Clearance {
         verdict: verdict_state_from("verdict", proto.verdict)?.ok_or_else(|| unspecified("verdict"))?,
         sea_state_stamp: Stamp::from_nanos(proto.sea_state_stamp_ns),
         valid_until: Stamp::from_nanos(proto.valid_until_ns),
+        windows: proto.windows.into_iter().take(WINDOWS_MAX).map(window_from).collect::<Result<_, _>>()?,
     })
 }
 
@@ -44,6 +48,7 @@ fn task_to(task: &Task) -> v1::assignment::Task {
                 verdict: verdict_state_to(clearance.verdict),
                 sea_state_stamp_ns: clearance.sea_state_stamp.as_nanos(),
                 valid_until_ns: clearance.valid_until.as_nanos(),
+                windows: clearance.windows.iter().map(window_to).collect(),
             }),
         }),
         Task::Return => Wired::ReturnHome(v1::ReturnTask {}),

@@ -170,6 +170,7 @@ impl<'a> Service<'a> {
                     let ended = self.autopilot.withdraw();
                     self.carry_out(ended, link).await;
                 }
+                Output::AskStreams => self.autopilot.started_again(),
                 Output::Note(note) => self.event(EventDraft::new(note.severity, note.what, note.why)).await,
             }
         }

@@ -4,5 +4,6 @@ mod commands;
 mod failsafes;
 mod flights;
 mod formation;
+mod mishaps;
 mod properties;
 mod world;
