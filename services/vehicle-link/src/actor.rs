@@ -215,7 +215,10 @@ impl<'a> Service<'a> {
                 warn!(vehicle = %self.vehicle, who = incoming.command.who, why, "command refused");
                 CommandReply::refused(now, why)
             }
-            Decision::Ask(_) if self.waiting.len() >= WAITING_MAX => CommandReply::refused(now, CommandError::Busy.to_string()),
+            // A termination waits for no place.
+            Decision::Ask(command) if self.waiting.len() >= WAITING_MAX && command != (Command::Disarm { force: true }) => {
+                CommandReply::refused(now, CommandError::Busy.to_string())
+            }
             Decision::Ask(command) => {
                 let ticket = self.next_ticket;
                 self.next_ticket += 1;
