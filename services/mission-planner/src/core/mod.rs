@@ -2,8 +2,10 @@
 //!
 //! - [`Planner`] holds the missions; [`Planner::step`] and [`Planner::command`] return [`Effects`].
 //! - [`geometry`] places the vehicles of a mission about its spot.
+//! - [`assignment`] and [`shape`] say who takes which slot of a formation of many.
 //! - [`Record`] is what must be stored before anything is announced; [`Saved`] is what the store gives back.
 
+pub mod assignment;
 mod command;
 mod fleet;
 mod flow;
@@ -12,6 +14,7 @@ mod homing;
 mod live;
 mod planner;
 mod record;
+pub mod shape;
 mod tasks;
 mod waters;
 
