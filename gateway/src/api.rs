@@ -4,6 +4,7 @@ pub mod dashboard;
 pub mod dto;
 pub mod events;
 pub mod extract;
+pub mod formations;
 pub mod guard;
 pub mod headers;
 pub mod idempotency;

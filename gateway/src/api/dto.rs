@@ -5,6 +5,7 @@
 //! faster than the reader's). A key that can be unknown is always present and `null` then. Numbers are never NaN.
 
 mod command;
+mod formation;
 mod mission;
 mod plan;
 mod sea;
@@ -18,6 +19,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 pub use command::{CommandResult, SlotOffset, VehicleCommandRequest};
+pub use formation::{Formation, FormationRequest, FormationShape};
 pub use mission::{
     Approval, CreateMission, Mission, MissionAbilities, MissionPhase, MissionTransition, PointInput, Possibility,
 };

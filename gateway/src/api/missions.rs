@@ -4,7 +4,7 @@ use axum::extract::State;
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::{Extension, Json};
-use halcyon_model::{Geodetic, LocalPoint, MissionAction, MissionCommand, MissionId, MissionSpec, VehicleId};
+use halcyon_model::{CommandReply, Geodetic, LocalPoint, MissionAction, MissionCommand, MissionId, MissionSpec, VehicleId};
 
 use super::dto::{CommandResult, CreateMission, Event, Mission, Page, PointInput};
 use super::events::event_page;
@@ -134,8 +134,17 @@ fn unknown(id: &MissionId) -> ApiError {
     ApiError::NotFound(format!("there is no mission {id}"))
 }
 
-/// Asks the planner and words its answer.
 async fn ask(app: &App, headers: &HeaderMap, id: MissionId, action: MissionAction) -> Result<Response, ApiError> {
+    ask_planner(app, headers, action, |reply| format!("/api/v1/missions/{}", reply.mission.as_ref().unwrap_or(&id))).await
+}
+
+/// Asks the planner and words its answer; `watch` names what to look at then.
+pub async fn ask_planner(
+    app: &App,
+    headers: &HeaderMap,
+    action: MissionAction,
+    watch: impl FnOnce(&CommandReply) -> String,
+) -> Result<Response, ApiError> {
     let who = operator(headers)?;
     let stamp = app.now();
     let (timeout, deadline) = app.command_limit(stamp);
@@ -145,7 +154,7 @@ async fn ask(app: &App, headers: &HeaderMap, id: MissionId, action: MissionActio
     if !reply.accepted {
         return Err(ApiError::Refused(reply.reason));
     }
-    let watch = format!("/api/v1/missions/{}", reply.mission.as_ref().unwrap_or(&id));
+    let watch = watch(&reply);
     Ok((StatusCode::ACCEPTED, [(header::LOCATION, watch.clone())], Json(CommandResult::new(&reply, watch))).into_response())
 }
 

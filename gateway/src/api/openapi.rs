@@ -12,7 +12,7 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use super::dto::{Problem, StreamMessage};
-use super::{events, missions, plan, probes, rigs, sea_states, services, stream, vehicles};
+use super::{events, formations, missions, plan, probes, rigs, sea_states, services, stream, vehicles};
 use crate::app::App;
 
 #[derive(utoipa::OpenApi)]
@@ -74,6 +74,8 @@ pub fn routes() -> OpenApiRouter<App> {
         .routes(routes!(vehicles::list))
         .routes(routes!(vehicles::show))
         .routes(routes!(vehicles::command))
+        .routes(routes!(formations::list, formations::order))
+        .routes(routes!(formations::disband))
         .routes(routes!(missions::list, missions::create))
         .routes(routes!(missions::show))
         .routes(routes!(missions::approve))

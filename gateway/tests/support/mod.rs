@@ -57,10 +57,11 @@ impl Commands for Shared {
             | MissionAction::Dispatch(id)
             | MissionAction::Pause(id)
             | MissionAction::Resume(id)
-            | MissionAction::Abort(id) => id.clone(),
+            | MissionAction::Abort(id) => Some(id.clone()),
+            MissionAction::Form(_) | MissionAction::Disband(_) => None,
         };
         self.0.mission_commands.lock().unwrap().push(command);
-        self.0.answer(Some(id))
+        self.0.answer(id)
     }
 
     fn vehicle(&self, command: VehicleCommand, _: Duration) -> BoxFuture<'_, Result<CommandReply, CommandFailure>> {

@@ -1,5 +1,6 @@
 use halcyon_model::{CommandReply, FlightMode, MissionAction, MissionCommand, Stamp, VehicleAction, VehicleCommand};
 
+use super::formation::{formation_from, formation_to};
 use super::geo::{point_from, point_to};
 use super::mission::{spec_from, spec_to};
 use super::plan::{slot_from, slot_to};
@@ -45,6 +46,8 @@ impl Wire for MissionCommand {
             MissionAction::Pause(id) => Action::Pause(id.to_string()),
             MissionAction::Resume(id) => Action::Resume(id.to_string()),
             MissionAction::Abort(id) => Action::Abort(id.to_string()),
+            MissionAction::Form(spec) => Action::Form(formation_to(spec)),
+            MissionAction::Disband(leader) => Action::Disband(leader.to_string()),
         };
         v1::MissionCommand {
             schema_version: SCHEMA_VERSION,
@@ -67,6 +70,8 @@ impl Wire for MissionCommand {
             Action::Pause(mission) => MissionAction::Pause(id("pause", &mission)?),
             Action::Resume(mission) => MissionAction::Resume(id("resume", &mission)?),
             Action::Abort(mission) => MissionAction::Abort(id("abort", &mission)?),
+            Action::Form(spec) => MissionAction::Form(formation_from(&spec)?),
+            Action::Disband(leader) => MissionAction::Disband(id("disband", &leader)?),
         };
         Ok(Self {
             stamp: header(proto.schema_version, proto.stamp_ns)?,

@@ -1,6 +1,7 @@
 //! Wire ⇄ model, one file a subject as in `halcyon/v1/`.
 
 mod command;
+mod formation;
 mod geo;
 mod mission;
 mod plan;

@@ -1,5 +1,6 @@
 //! Commands: each is a query with a typed answer, accepted or refused with a reason, never lost in silence.
 
+use crate::formation::FormationSpec;
 use crate::geo::LocalPoint;
 use crate::id::{MissionId, VehicleId};
 use crate::mission::MissionSpec;
@@ -49,6 +50,11 @@ pub enum MissionAction {
     Resume(MissionId),
     /// Everyone returns. Works from every state.
     Abort(MissionId),
+    /// Followers keep a shape about a leader, until they are told otherwise. The same again is answered as before; another shape, or
+    /// others, changes the formation that the leader has.
+    Form(FormationSpec),
+    /// The followers of this leader return.
+    Disband(VehicleId),
 }
 
 /// A command to the mission planner.

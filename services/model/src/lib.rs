@@ -19,6 +19,7 @@
 pub mod camera_info;
 pub mod command;
 pub mod fleet;
+pub mod formation;
 pub mod geo;
 pub mod grid_error;
 pub mod id;
@@ -35,6 +36,7 @@ mod yaml;
 pub use bytes::Bytes;
 pub use command::{CommandReply, MissionAction, MissionCommand, VehicleAction, VehicleCommand};
 pub use fleet::FleetOrigin;
+pub use formation::{FormationSpec, Shape};
 pub use geo::{Geodetic, LocalFrame, LocalPoint};
 pub use id::{FleetId, IdError, InstanceId, MissionId, RigId, VehicleId};
 pub use mission::{Approval, Mission, MissionPhase, MissionSpec, Transition};

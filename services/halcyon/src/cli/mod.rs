@@ -2,8 +2,10 @@
 
 mod bench;
 mod calibrate;
+mod client;
 mod config;
 mod features;
+mod formation;
 mod lab;
 mod matching;
 mod mission;
@@ -61,6 +63,8 @@ enum Command {
     Bench(bench::Args),
     /// Make the thesis's tables and figures again, its values beside ours
     Lab(lab::Args),
+    /// Have followers keep a shape about a leader of a running fleet
+    Formation(formation::Args),
     /// Create, watch and command missions of a running fleet
     Mission(mission::Args),
     /// Simulate: render water to a survey folder, or serve vehicles over MAVLink
@@ -93,6 +97,7 @@ pub fn main() -> ExitCode {
         Command::Survey(args) => survey::run(&options, &args),
         Command::Bench(args) => bench::run(&args),
         Command::Lab(args) => lab::run(&args),
+        Command::Formation(args) => formation::run(args),
         Command::Mission(args) => mission::run(args),
         Command::Sim(args) => sim::run(&options, args),
         Command::Config(args) => config::run(&options, &args),

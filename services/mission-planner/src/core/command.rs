@@ -34,15 +34,18 @@ impl Planner {
         let reply = match outcome {
             Refused(reason) => CommandReply::refused(now, reason),
             Done(reason) => {
-                self.retire(now);
+                self.retire(now, &mut effects);
                 self.advance(now, &mut effects);
-                let (MissionAction::Create(id, _)
-                | MissionAction::Approve(id)
-                | MissionAction::Dispatch(id)
-                | MissionAction::Pause(id)
-                | MissionAction::Resume(id)
-                | MissionAction::Abort(id)) = &command.action;
-                CommandReply { mission: Some(id.clone()), ..CommandReply::accepted(now, reason) }
+                let mission = match &command.action {
+                    MissionAction::Create(id, _)
+                    | MissionAction::Approve(id)
+                    | MissionAction::Dispatch(id)
+                    | MissionAction::Pause(id)
+                    | MissionAction::Resume(id)
+                    | MissionAction::Abort(id) => Some(id.clone()),
+                    MissionAction::Form(_) | MissionAction::Disband(_) => None,
+                };
+                CommandReply { mission, ..CommandReply::accepted(now, reason) }
             }
         };
         (reply, effects)
@@ -85,6 +88,11 @@ impl Planner {
                     Done(format!("mission {id} is aborted"))
                 })
             }
+            MissionAction::Form(spec) => self.form(spec, who, now, effects).map_or_else(Refused, Done),
+            MissionAction::Disband(leader) => match self.disband(leader, who, now, effects) {
+                Some(count) => Done(format!("{count} followers of {leader} return")),
+                None => Refused(format!("{leader} has no formation")),
+            },
         }
     }
 

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use halcyon_model::{Activity, LandedState, LocalFrame, LocalPoint, Role, Stamp, VehicleId, VehicleState};
 
+use super::live::World;
 use crate::config::Config;
 
 /// Vehicles that are kept in mind; more are ignored, so that a flood of names cannot fill the memory.
@@ -126,6 +127,11 @@ impl Fleet {
         self.vehicles.get(vehicle).and_then(|known| known.landed_since).is_some_and(|since| now.seconds_since(since) >= for_s)
     }
 
+    /// Everyone of a role.
+    pub(super) fn of_role(&self, role: Role) -> impl Iterator<Item = &VehicleId> {
+        self.vehicles.iter().filter(move |(_, known)| known.state.role == role).map(|(vehicle, _)| vehicle)
+    }
+
     /// A vehicle, other than `besides`, whose last known place is within `radius_m` of `point`. However old that knowledge is:
     /// a vehicle that fell silent is still somewhere.
     #[must_use]
@@ -139,7 +145,8 @@ impl Fleet {
 
     /// Why `vehicle` cannot be sent now; `None` if it can. `named` says that the mission asks for this very vehicle.
     #[must_use]
-    pub(super) fn obstacle(&self, vehicle: &VehicleId, role: Role, named: bool, now: Stamp, config: &Config) -> Option<String> {
+    pub(super) fn obstacle(&self, vehicle: &VehicleId, role: Role, named: bool, world: &World<'_>) -> Option<String> {
+        let (now, config) = (world.now, world.config);
         let Some(state) = self.last(vehicle) else { return Some("not heard yet".into()) };
         if state.role != role {
             return Some(format!("not a {}", role_name(role)));
@@ -162,6 +169,7 @@ impl Fleet {
             (_, LandedState::OnGround) if !state.ready_to_arm => Some("not ready to arm".into()),
             (_, LandedState::OnGround) => away_from_home(state, named, config),
             (Activity::Idle | Activity::Holding { .. }, LandedState::InAir) => None,
+            (Activity::Following { .. }, LandedState::InAir) if world.formations.leader_of(vehicle).is_some() => None,
             (_, LandedState::Unknown) => Some("it is not known whether it is on the ground".into()),
             _ => Some("busy in the air".into()),
         }
@@ -178,8 +186,7 @@ impl Fleet {
         named: Option<&VehicleId>,
         point: LocalPoint,
         taken: &BTreeSet<VehicleId>,
-        now: Stamp,
-        config: &Config,
+        world: &World<'_>,
     ) -> Result<(VehicleId, LocalPoint), String> {
         let mut best: Option<(f64, &VehicleId, LocalPoint)> = None;
         let mut reasons = Vec::new();
@@ -191,7 +198,7 @@ impl Fleet {
             let obstacle = if taken.contains(vehicle) {
                 Some("busy in another mission".into())
             } else {
-                self.obstacle(vehicle, role, named.is_some(), now, config)
+                self.obstacle(vehicle, role, named.is_some(), world)
             };
             if let Some(obstacle) = obstacle {
                 reasons.push(format!("{vehicle}: {obstacle}"));

@@ -10,7 +10,8 @@ use super::record::{Effects, Notice, Record};
 /// One vehicle on its way home.
 #[derive(Debug)]
 struct Homing {
-    mission: MissionId,
+    /// Its mission; `None` after a formation.
+    mission: Option<MissionId>,
     since: Stamp,
     /// It rests on the water, and stays there whatever its landing detector makes of the waves.
     stays: bool,
@@ -23,7 +24,7 @@ struct Homing {
 pub(super) struct Homings(BTreeMap<VehicleId, Homing>);
 
 impl Homings {
-    pub(super) fn add(&mut self, vehicle: VehicleId, mission: MissionId, stays: bool, now: Stamp) {
+    pub(super) fn add(&mut self, vehicle: VehicleId, mission: Option<MissionId>, stays: bool, now: Stamp) {
         self.0.insert(vehicle, Homing { mission, since: now, stays, task_generation: None, reported: false });
     }
 
@@ -42,16 +43,16 @@ impl Homings {
                 })
             });
             if over {
-                let (mission, vehicle) = (homing.mission.clone(), vehicle.clone());
-                effects.records.push(Record::Released { mission, vehicle, stamp: world.now });
+                let release = |mission| Record::Released { mission, vehicle: vehicle.clone(), stamp: world.now };
+                effects.records.extend(homing.mission.clone().map(release));
             } else if !homing.reported && world.now.seconds_since(homing.since) > world.config.return_max_s {
                 homing.reported = true;
                 effects.notices.push(Notice {
                     severity: Severity::Critical,
                     what: format!("{vehicle} has not come home"),
-                    why: format!("its mission ended {:.0} s ago", world.config.return_max_s),
+                    why: format!("it was called back {:.0} s ago", world.config.return_max_s),
                     vehicle: Some(vehicle.clone()),
-                    mission: Some(homing.mission.clone()),
+                    mission: homing.mission.clone(),
                 });
             }
             !over

@@ -8,6 +8,7 @@ use halcyon_model::{
 };
 
 use super::fleet::Fleet;
+use super::formation::Formations;
 use super::geometry;
 use super::record::Course;
 use super::waters::Waters;
@@ -21,6 +22,7 @@ const NOTE_PERIOD_S: f64 = 10.0;
 pub(super) struct World<'a> {
     pub(super) config: &'a Config,
     pub(super) fleet: &'a Fleet,
+    pub(super) formations: &'a Formations,
     pub(super) waters: &'a Waters,
     pub(super) now: Stamp,
 }

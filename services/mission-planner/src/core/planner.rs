@@ -3,12 +3,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use halcyon_model::{
-    DispatchPlan, LandedState, Mission, MissionId, MissionPhase, MissionSpec, SeaState, Severity, Stamp, VehicleId,
-    VehicleState,
+    DispatchPlan, FormationSpec, LandedState, Mission, MissionId, MissionPhase, MissionSpec, SeaState, Severity, Stamp,
+    VehicleId, VehicleState,
 };
 
 use super::fleet::{Fleet, Ignored};
 use super::flow;
+use super::formation::{self, Formation, Formations};
 use super::homing::Homings;
 use super::live::{Live, World};
 use super::record::{Effects, Notice, Record, Saved};
@@ -40,6 +41,7 @@ pub struct Planner {
     /// What became of the others.
     pub(super) finished: BTreeMap<MissionId, (MissionSpec, MissionPhase)>,
     homings: Homings,
+    pub(super) formations: Formations,
     generation: u64,
     generation_reserved: u64,
     issued: Option<DispatchPlan>,
@@ -55,6 +57,7 @@ impl Planner {
             live: Vec::new(),
             finished: BTreeMap::new(),
             homings: Homings::default(),
+            formations: Formations::restored(saved.formations),
             generation: saved.generation,
             generation_reserved: saved.generation,
             issued: None,
@@ -70,13 +73,13 @@ impl Planner {
                 }
                 for vehicle in saved.crew {
                     let rests = mission.touchdown.is_some() && mission.follower.as_ref() == Some(&vehicle);
-                    planner.homings.add(vehicle, mission.id.clone(), rests, now);
+                    planner.homings.add(vehicle, Some(mission.id.clone()), rests, now);
                 }
                 planner.finished.insert(mission.id, (mission.spec, mission.phase));
             } else {
                 let mut live = Live::restored(mission, saved.course, now);
                 for vehicle in saved.crew.into_iter().filter(|vehicle| !live.crew().any(|mine| mine == vehicle)) {
-                    planner.homings.add(vehicle, live.mission.id.clone(), false, now);
+                    planner.homings.add(vehicle, Some(live.mission.id.clone()), false, now);
                 }
                 let phase = live.mission.phase;
                 enter(&mut live, (phase, "the planner was restarted".into()), PLANNER, now, &mut effects);
@@ -110,7 +113,7 @@ impl Planner {
     }
 
     pub(super) fn world(&self, now: Stamp) -> World<'_> {
-        World { config: &self.config, fleet: &self.fleet, waters: &self.waters, now }
+        World { config: &self.config, fleet: &self.fleet, formations: &self.formations, waters: &self.waters, now }
     }
 
     /// Missions under way.
@@ -129,15 +132,15 @@ impl Planner {
         for index in 0..self.live.len() {
             self.advance_mission(index, now, effects);
         }
-        self.retire(now);
-        let world = World { config: &self.config, fleet: &self.fleet, waters: &self.waters, now };
+        self.retire(now, effects);
+        let world = World { config: &self.config, fleet: &self.fleet, formations: &self.formations, waters: &self.waters, now };
         self.homings.step(&world, effects);
         self.plan(now, effects);
     }
 
     fn advance_mission(&mut self, index: usize, now: Stamp, effects: &mut Effects) {
         let taken = self.taken_by_others(index);
-        let world = World { config: &self.config, fleet: &self.fleet, waters: &self.waters, now };
+        let world = World { config: &self.config, fleet: &self.fleet, formations: &self.formations, waters: &self.waters, now };
         let live = &mut self.live[index];
         for _ in 0..STEPS_MAX {
             let Some(step) = flow::advance(live, &world, &taken) else { break };
@@ -166,34 +169,91 @@ impl Planner {
             .enumerate()
             .filter(|(other, _)| *other != index)
             .flat_map(|(_, live)| live.crew().chain(&live.dropped));
-        others.chain(self.homings.vehicles()).cloned().collect()
+        let leader = self.live.get(index).and_then(|live| live.mission.leader.as_ref());
+        others.chain(self.homings.vehicles()).chain(self.formations.members_of_others(leader)).cloned().collect()
     }
 
     /// Sends home whoever a mission let go of, and puts finished missions aside.
-    pub(super) fn retire(&mut self, now: Stamp) {
+    pub(super) fn retire(&mut self, now: Stamp, effects: &mut Effects) {
+        let mut home = Vec::new();
         for live in &mut self.live {
-            for vehicle in live.dropped.drain(..) {
-                self.homings.add(vehicle, live.mission.id.clone(), false, now);
-            }
+            home.extend(live.dropped.drain(..).map(|vehicle| (vehicle, live.mission.id.clone(), false)));
             if !live.mission.phase.is_final() {
                 continue;
             }
             let mission = &live.mission;
             if let Some(leader) = &mission.leader {
-                self.homings.add(leader.clone(), mission.id.clone(), false, now);
+                home.push((leader.clone(), mission.id.clone(), false));
             }
             if let Some(follower) = &mission.follower {
                 let on_water = live.course.reached_landing && is_down(&self.fleet, follower);
-                self.homings.add(follower.clone(), mission.id.clone(), mission.touchdown.is_some() || on_water, now);
+                home.push((follower.clone(), mission.id.clone(), mission.touchdown.is_some() || on_water));
             }
             self.finished.insert(mission.id.clone(), (mission.spec.clone(), mission.phase));
         }
         self.live.retain(|live| !live.mission.phase.is_final());
+        for (vehicle, mission, stays) in home {
+            if let Some(changed) = self.formations.leave(&vehicle) {
+                effects.records.push(Record::Formed { formation: changed, who: PLANNER.into(), stamp: now });
+            }
+            // Its formation has nobody to follow any more.
+            self.disband(&vehicle, PLANNER, now, effects);
+            self.homings.add(vehicle, Some(mission), stays, now);
+        }
+    }
+
+    /// Makes or changes the formation of a leader.
+    ///
+    /// # Errors
+    /// Why it cannot be.
+    pub(super) fn form(
+        &mut self,
+        spec: &FormationSpec,
+        who: &str,
+        now: Stamp,
+        effects: &mut Effects,
+    ) -> Result<String, String> {
+        let leader = &spec.leader;
+        let own = self.live.iter().filter(|live| live.mission.leader.as_ref() != Some(leader));
+        let mut taken: BTreeSet<VehicleId> = own.flat_map(|live| live.crew().chain(&live.dropped)).cloned().collect();
+        let followers = self.live.iter().filter_map(|live| live.mission.follower.as_ref());
+        taken.extend(followers.chain(self.formations.members_of_others(Some(leader))).cloned());
+        taken.extend(self.homings.vehicles().cloned());
+        if taken.contains(leader) && self.homings.vehicles().any(|vehicle| vehicle == leader) {
+            return Err(format!("{leader} is on its way home"));
+        }
+        let formation = formation::form(spec, &taken, &self.world(now))?;
+        let count = formation.members.len();
+        let words = format!("{count} in {} about {leader}", spec.shape.as_str());
+        let same = |before: &Formation| before.spec == *spec && before.members.keys().eq(formation.members.keys());
+        if self.formations.of(leader).is_some_and(same) {
+            return Ok(words);
+        }
+        effects.records.push(Record::Formed { formation: formation.clone(), who: who.into(), stamp: now });
+        effects.notices.push(order("formation ordered", format!("{who}: {words}"), leader));
+        for vehicle in self.formations.put(formation) {
+            self.homings.add(vehicle, None, false, now);
+        }
+        Ok(words)
+    }
+
+    /// Ends the formation of a leader, if it has one: its followers return. Returns how many.
+    pub(super) fn disband(&mut self, leader: &VehicleId, who: &str, now: Stamp, effects: &mut Effects) -> Option<usize> {
+        let ended = self.formations.of(leader)?.clone();
+        let members = self.formations.end(leader)?;
+        let formation = Formation { members: BTreeMap::new(), ..ended };
+        effects.records.push(Record::Formed { formation, who: who.into(), stamp: now });
+        effects.notices.push(order("formation disbanded", format!("{who}: {} return", members.len()), leader));
+        let busy: BTreeSet<VehicleId> = self.live.iter().flat_map(Live::crew).chain(self.homings.vehicles()).cloned().collect();
+        for vehicle in members.iter().filter(|member| !busy.contains(*member)) {
+            self.homings.add(vehicle.clone(), None, false, now);
+        }
+        Some(members.len())
     }
 
     /// Issues a plan if the one in force no longer suits, or must be extended.
     fn plan(&mut self, now: Stamp, effects: &mut Effects) {
-        let world = World { config: &self.config, fleet: &self.fleet, waters: &self.waters, now };
+        let world = World { config: &self.config, fleet: &self.fleet, formations: &self.formations, waters: &self.waters, now };
         let mut assignments = Vec::new();
         for live in &mut self.live {
             let tasks = tasks::assignments(live, &world);
@@ -201,6 +261,8 @@ impl Planner {
             assignments.extend(tasks);
         }
         assignments.extend(self.homings.assignments(&world));
+        let busy = assignments.iter().map(|assignment| assignment.vehicle.clone()).collect();
+        assignments.extend(self.formations.assignments(&busy));
         if let Some(issued) = &self.issued
             && issued.assignments == assignments
             && issued.generation == self.generation
@@ -254,6 +316,10 @@ fn announce(mission: &Mission, effects: &mut Effects) {
 
 fn notice(severity: Severity, what: &str, why: String, mission: &Mission) -> Notice {
     Notice { severity, what: what.to_owned(), why, vehicle: None, mission: Some(mission.id.clone()) }
+}
+
+fn order(what: &str, why: String, leader: &VehicleId) -> Notice {
+    Notice { severity: Severity::Info, what: what.into(), why, vehicle: Some(leader.clone()), mission: None }
 }
 
 /// Tells people when the permission to descend comes and goes.

@@ -2,6 +2,8 @@
 
 use halcyon_model::{Mission, MissionId, MissionPhase, MissionSpec, Severity, Stamp, Transition, VehicleId};
 
+use super::formation::Formation;
+
 /// What a mission needs besides [`Mission`] to go on after a restart.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Course {
@@ -49,6 +51,15 @@ pub enum Record {
         /// When.
         stamp: Stamp,
     },
+    /// A formation was ordered, or changed; without members it is disbanded.
+    Formed {
+        /// As it is now.
+        formation: Formation,
+        /// Who ordered it.
+        who: String,
+        /// When.
+        stamp: Stamp,
+    },
     /// Plans up to this generation may have been issued; a restart begins above it. Stored in large steps, since a plan is
     /// issued twice a second.
     Reserved {
@@ -75,6 +86,8 @@ pub struct Saved {
     pub generation: u64,
     /// Missions, in the order in which they were created.
     pub missions: Vec<SavedMission>,
+    /// Formations in force.
+    pub formations: Vec<Formation>,
 }
 
 /// Something to tell people.

@@ -3,6 +3,7 @@
 //! A batch of records is stored whole or not at all, and is on the disk when [`Store::append`] returns. The file is locked
 //! for as long as the store is open: two planners on one file would issue the same generations.
 
+mod formation;
 mod read;
 mod thread;
 mod write;
@@ -19,7 +20,7 @@ pub use thread::StoreThread;
 /// `HALC`: marks the file as ours.
 const APPLICATION_ID: i32 = 0x4841_4C43;
 /// The schema that this build writes.
-const SCHEMA_VERSION: i32 = 1;
+const SCHEMA_VERSION: i32 = 2;
 /// How long to wait for another planner to let go of the file; a planner that is restarted in place needs a moment.
 const LOCK_WAIT: Duration = Duration::from_secs(3);
 
@@ -141,8 +142,16 @@ impl Store {
             (0, 0) if tables == 0 => self
                 .connection
                 .execute_batch(&format!(
-                    "BEGIN; {} PRAGMA application_id = {APPLICATION_ID}; PRAGMA user_version = {SCHEMA_VERSION}; COMMIT;",
-                    include_str!("schema.sql")
+                    "BEGIN; {} {} PRAGMA application_id = {APPLICATION_ID}; PRAGMA user_version = {SCHEMA_VERSION}; COMMIT;",
+                    include_str!("schema.sql"),
+                    include_str!("formation.sql"),
+                ))
+                .map_err(|source| StoreError::Write { path: path(), source }),
+            (APPLICATION_ID, 1) => self
+                .connection
+                .execute_batch(&format!(
+                    "BEGIN; {} PRAGMA user_version = {SCHEMA_VERSION}; COMMIT;",
+                    include_str!("formation.sql"),
                 ))
                 .map_err(|source| StoreError::Write { path: path(), source }),
             (APPLICATION_ID, SCHEMA_VERSION) => Ok(()),

@@ -49,18 +49,22 @@ pub(super) fn load(connection: &Connection) -> rusqlite::Result<Saved> {
     for (mission, crew) in missions.iter_mut().zip(crews) {
         mission.crew = crew.into_iter().collect();
     }
-    Ok(Saved { generation: generation.and_then(|reserved| u64::try_from(reserved).ok()).unwrap_or(0), missions })
+    Ok(Saved {
+        generation: generation.and_then(|reserved| u64::try_from(reserved).ok()).unwrap_or(0),
+        missions,
+        formations: super::formation::load(connection)?,
+    })
 }
 
 fn invalid(error: impl std::error::Error + Send + Sync + 'static) -> rusqlite::Error {
     rusqlite::Error::FromSqlConversionFailure(0, Type::Text, Box::new(error))
 }
 
-fn id<I: FromStr<Err = IdError>>(row: &Row<'_>, column: &str) -> rusqlite::Result<Option<I>> {
+pub(super) fn id<I: FromStr<Err = IdError>>(row: &Row<'_>, column: &str) -> rusqlite::Result<Option<I>> {
     row.get::<_, Option<String>>(column)?.map(|text| text.parse().map_err(invalid)).transpose()
 }
 
-fn word<T>(row: &Row<'_>, column: &str, from_name: impl Fn(&str) -> Option<T>) -> rusqlite::Result<Option<T>> {
+pub(super) fn word<T>(row: &Row<'_>, column: &str, from_name: impl Fn(&str) -> Option<T>) -> rusqlite::Result<Option<T>> {
     let text: Option<String> = row.get(column)?;
     text.map(|text| from_name(&text).ok_or_else(|| invalid(UnknownWord(text)))).transpose()
 }

@@ -21,6 +21,7 @@ pub(super) fn append(connection: &mut Connection, records: &[Record]) -> rusqlit
                     params![mission.as_str(), vehicle.as_str(), stamp.as_nanos()],
                 )?;
             }
+            Record::Formed { formation, who, stamp } => super::formation::formed(&transaction, formation, who, *stamp)?,
             Record::Reserved { generation } => {
                 // The planner never gets near 2⁶³; a number that does not fit must not wrap.
                 let reserved =

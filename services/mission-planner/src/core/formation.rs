@@ -1,0 +1,153 @@
+//! Standing formations: followers that keep a shape about a leader for as long as nobody says otherwise.
+//!
+//! A mission of that leader takes its follower from the formation, and the follower leaves it for good: after a mission a vehicle
+//! comes home, and nothing takes off again for an order that it has left. Slots are given out so that the ways there do not cross
+//! ([`super::assignment`]), anew at every order.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use halcyon_model::{Assignment, FormationSpec, LocalPoint, Role, Slot, Task, VehicleId};
+
+use super::assignment::assign;
+use super::fleet::role_name;
+use super::geometry::offset;
+use super::live::World;
+use super::shape::shape;
+
+/// Followers of one leader.
+pub const MEMBERS_MAX: usize = 16;
+/// Farther apart than this it is no formation, metres.
+const SPACING_M_MAX: f64 = 100.0;
+
+/// One formation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Formation {
+    /// As it was ordered.
+    pub spec: FormationSpec,
+    /// Who keeps which slot now.
+    pub members: BTreeMap<VehicleId, Slot>,
+}
+
+/// All of them, by leader.
+#[derive(Debug, Default)]
+pub(super) struct Formations(BTreeMap<VehicleId, Formation>);
+
+impl Formations {
+    pub(super) fn restored(formations: Vec<Formation>) -> Self {
+        Self(formations.into_iter().map(|formation| (formation.spec.leader.clone(), formation)).collect())
+    }
+
+    pub(super) fn of(&self, leader: &VehicleId) -> Option<&Formation> {
+        self.0.get(leader)
+    }
+
+    /// The leader of the formation that `vehicle` is in.
+    pub(super) fn leader_of(&self, vehicle: &VehicleId) -> Option<&VehicleId> {
+        self.0.iter().find(|(_, formation)| formation.members.contains_key(vehicle)).map(|(leader, _)| leader)
+    }
+
+    /// Members of formations about anyone but `leader`.
+    pub(super) fn members_of_others(&self, leader: Option<&VehicleId>) -> impl Iterator<Item = &VehicleId> {
+        self.0.iter().filter(move |(other, _)| Some(*other) != leader).flat_map(|(_, formation)| formation.members.keys())
+    }
+
+    /// Puts a formation in the place of the one that its leader had; returns whom that leaves without a slot.
+    pub(super) fn put(&mut self, formation: Formation) -> Vec<VehicleId> {
+        let kept: BTreeSet<_> = formation.members.keys().cloned().collect();
+        let before = self.0.insert(formation.spec.leader.clone(), formation);
+        before.map_or_else(Vec::new, |before| before.members.into_keys().filter(|member| !kept.contains(member)).collect())
+    }
+
+    /// Ends the formation of a leader; returns who was in it.
+    pub(super) fn end(&mut self, leader: &VehicleId) -> Option<Vec<VehicleId>> {
+        self.0.remove(leader).map(|formation| formation.members.into_keys().collect())
+    }
+
+    /// A vehicle that has something else to do leaves its formation for good. Returns the formation that changed, to be stored.
+    pub(super) fn leave(&mut self, vehicle: &VehicleId) -> Option<Formation> {
+        let leader = self.leader_of(vehicle)?.clone();
+        let formation = self.0.get_mut(&leader)?;
+        formation.members.remove(vehicle);
+        let changed = formation.clone();
+        if changed.members.is_empty() {
+            self.0.remove(&leader);
+        }
+        Some(changed)
+    }
+
+    /// What the members that nobody else needs are to do.
+    pub(super) fn assignments(&self, busy: &BTreeSet<VehicleId>) -> Vec<Assignment> {
+        let of = |(leader, formation): (&VehicleId, &Formation)| -> Vec<Assignment> {
+            let free = formation.members.iter().filter(|(member, _)| !busy.contains(member));
+            let task = |slot: &Slot| Task::Follow { leader: leader.clone(), slot: *slot };
+            free.map(|(member, slot)| Assignment { vehicle: member.clone(), task: task(slot) }).collect()
+        };
+        self.0.iter().flat_map(of).collect()
+    }
+}
+
+/// Checks an order and gives out the slots. `taken`: vehicles that other missions and formations have.
+///
+/// # Errors
+/// Why it cannot be.
+pub(super) fn form(spec: &FormationSpec, taken: &BTreeSet<VehicleId>, world: &World<'_>) -> Result<Formation, String> {
+    let (least_m, spacing_m) = (world.config.separation_m, spec.spacing_m);
+    if !(least_m..=SPACING_M_MAX).contains(&spacing_m) {
+        return Err(format!("the spacing must be {least_m} to {SPACING_M_MAX} m, not {spacing_m} m"));
+    }
+    let leader = &spec.leader;
+    let Some(state) = world.fleet.last(leader) else { return Err(format!("vehicle {leader} is not known")) };
+    if state.role != Role::Leader {
+        return Err(format!("{leader} is a {}, not a leader", role_name(state.role)));
+    }
+    let Some(state) = world.fleet.fresh(leader, world.now, world.config) else {
+        return Err(format!("{leader} has not been heard lately"));
+    };
+    let followers = followers(spec, taken, world)?;
+    let slots: Vec<Slot> = shape(spec.shape, followers.len(), spacing_m)
+        .into_iter()
+        .map(|slot| Slot { up_m: slot.up_m + world.config.slot_up_m, ..slot })
+        .collect();
+    let here = LocalPoint::from(state.position_ned_m);
+    let targets: Vec<_> = slots.iter().map(|slot| offset(here, state.heading_rad, slot.forward_m, slot.right_m)).collect();
+    let places: Vec<_> = followers.iter().map(|(_, place)| *place).collect();
+    let given = assign(&places, &targets);
+    let member = |((vehicle, _), slot): ((VehicleId, LocalPoint), Option<usize>)| slots.get(slot?).map(|slot| (vehicle, *slot));
+    Ok(Formation { spec: spec.clone(), members: followers.into_iter().zip(given).filter_map(member).collect() })
+}
+
+/// Those who are to be in it, and where they are.
+fn followers(
+    spec: &FormationSpec,
+    taken: &BTreeSet<VehicleId>,
+    world: &World<'_>,
+) -> Result<Vec<(VehicleId, LocalPoint)>, String> {
+    let named: BTreeSet<_> = spec.followers.iter().cloned().collect();
+    if named.len() != spec.followers.len() {
+        return Err("a follower is named twice".into());
+    }
+    let candidates: BTreeSet<VehicleId> =
+        if named.is_empty() { world.fleet.of_role(Role::Follower).cloned().collect() } else { named.clone() };
+    let mut found = Vec::new();
+    let mut reasons = Vec::new();
+    for vehicle in candidates {
+        let obstacle = if taken.contains(&vehicle) {
+            Some("busy in a mission or another formation".to_owned())
+        } else {
+            world.fleet.obstacle(&vehicle, Role::Follower, !named.is_empty(), world)
+        };
+        match (obstacle, world.fleet.last(&vehicle)) {
+            (None, Some(state)) => found.push((vehicle, LocalPoint::from(state.position_ned_m))),
+            (obstacle, _) => reasons.push(format!("{vehicle}: {}", obstacle.unwrap_or_else(|| "not heard yet".into()))),
+        }
+    }
+    reasons.truncate(MEMBERS_MAX);
+    if found.is_empty() || (!named.is_empty() && !reasons.is_empty()) {
+        let reasons = if reasons.is_empty() { "no follower has been heard".into() } else { reasons.join("; ") };
+        return Err(reasons);
+    }
+    if found.len() > MEMBERS_MAX {
+        return Err(format!("a leader takes at most {MEMBERS_MAX} followers, not {}", found.len()));
+    }
+    Ok(found)
+}
