@@ -117,3 +117,35 @@ impl Wire for DispatchPlan {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use halcyon_model::{CalmWindow, VerdictState};
+
+    use super::*;
+
+    #[test]
+    fn a_clearances_windows_travel_and_no_more_than_count() {
+        let t = |s: f64| Stamp::from_secs_f64(1000.0 + s);
+        let window = |index: u32| CalmWindow { from: t(f64::from(index)), to: t(f64::from(index) + 0.5) };
+        let given = |count: u32| Task::Land {
+            point: halcyon_model::LocalPoint::new(1.0, 2.0),
+            approach_height_m: 5.0,
+            clearance: Some(Clearance {
+                verdict: VerdictState::Safe,
+                sea_state_stamp: t(0.0),
+                valid_until: t(9.0),
+                windows: (0..count).map(window).collect(),
+            }),
+        };
+        for count in [0, 3, WINDOWS_MAX as u32] {
+            assert_eq!(task_from(task_to(&given(count))), Ok(given(count)));
+        }
+        assert_eq!(task_from(task_to(&given(20))), Ok(given(WINDOWS_MAX as u32)));
+        let mut backwards = given(1);
+        if let Task::Land { clearance: Some(clearance), .. } = &mut backwards {
+            clearance.windows = vec![CalmWindow { from: t(2.0), to: t(1.0) }];
+        }
+        assert!(task_from(task_to(&backwards)).is_err());
+    }
+}
