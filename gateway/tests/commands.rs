@@ -8,7 +8,9 @@ use std::time::Duration;
 
 use halcyon_gateway::Config;
 use halcyon_gateway::port::CommandFailure;
-use halcyon_model::{Approval, CommandReply, FlightMode, MissionAction, MissionPhase, VehicleAction};
+use halcyon_model::{
+    Approval, CommandReply, FlightMode, FormationSpec, MissionAction, MissionPhase, Shape, VehicleAction, VehicleId,
+};
 use serde_json::json;
 use support::*;
 
@@ -241,4 +243,27 @@ async fn other_names_and_other_pages_are_turned_away() {
     gateway.send(post("null")).await.is_problem(403, "origin");
     assert_eq!(gateway.send(post(&format!("http://{}", gateway.address))).await.status, 202);
     assert_eq!(created(&gateway).len(), 1);
+}
+
+#[tokio::test]
+async fn formations_are_ordered_and_disbanded_in_the_planners_words() {
+    let gateway = gateway().await;
+    let body = json!({"leader": "leader-1", "shape": "vee", "spacing_m": 8.5, "followers": ["b", "a"]});
+    let answer = gateway.post("/api/v1/formations", &body).await;
+    assert_eq!((answer.status, answer.headers["location"].to_str().unwrap()), (202, "/api/v1/formations"), "{answer:?}");
+    let id = |text: &str| VehicleId::new(text).unwrap();
+    let asked = FormationSpec { leader: id("leader-1"), shape: Shape::Vee, spacing_m: 8.5, followers: vec![id("b"), id("a")] };
+    assert_eq!(gateway.played.mission_commands.lock().unwrap()[0].action, MissionAction::Form(asked));
+    let bad = async |key: &str, value: serde_json::Value, words: &str| {
+        let mut body = body.clone();
+        body[key] = value;
+        gateway.post("/api/v1/formations", &body).await.is_problem(422, words);
+    };
+    bad("leader", json!("a/b"), "a/b").await;
+    bad("shape", json!("ring"), "ring").await;
+    bad("spacing_m", json!(0), "spacing_m must be above 0").await;
+    bad("spacing_m", json!(1e9), "spacing_m must be above 0").await;
+    bad("followers", json!(["a", ""]), "empty").await;
+    gateway.post("/api/v1/formations/nobody/disband", &json!(null)).await.is_problem(404, "no vehicle nobody");
+    assert_eq!(gateway.played.mission_commands.lock().unwrap().len(), 1);
 }

@@ -104,8 +104,13 @@ async fn command(client: &Client, command: Command, json: bool) -> anyhow::Resul
             if let Some(height) = height {
                 body["survey_height_m"] = height.into();
             }
-            let mission = client.send(Method::POST, "missions", Some(body)).await?;
-            return show(&mission, json);
+            let answer = client.send(Method::POST, "missions", Some(body)).await?;
+            if json {
+                output::json(&answer)?;
+            } else {
+                output::line(&format!("{}: {}", text(&answer, "mission"), text(&answer, "reason")))?;
+            }
+            return Ok(ExitCode::SUCCESS);
         }
         Command::List => {
             let page = client.send(Method::GET, "missions?limit=100", None).await?;
