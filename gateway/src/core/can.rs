@@ -100,12 +100,6 @@ mod tests {
             verdict: None,
             h_s_m: None,
             touchdown: None,
-            acceleration_ned_mps2: None,
-            intent: None,
-            range: None,
-            ages: halcyon_model::Ages::default(),
-            link: None,
-            firmware: None,
             history: Vec::new(),
         };
         let rules = [

@@ -29,6 +29,7 @@ pub mod sea;
 pub mod service;
 pub mod stereo;
 pub mod time;
+pub mod transfer;
 pub mod vehicle;
 mod yaml;
 
@@ -48,6 +49,9 @@ pub use stereo::{
     CameraIntrinsics, ElevationGrid, Image, Plane, PoseAtExposure, Preview, RigCalibration, StereoPair, SurfacePatch,
 };
 pub use time::Stamp;
+pub use transfer::{
+    Content, Item, ItemFrame, ItemKind, Parameter, ParameterKind, ParameterName, ParameterNameError,
+};
 pub use vehicle::{
     Activity, Ages, Firmware, Fix, FlightMode, Intent, LandedState, LinkQuality, Range, Role, SimTruth, VehicleState,
 };
