@@ -161,7 +161,7 @@ pub(super) struct Upload {
     asked: bool,
     /// The item that it waits for.
     wanted: Option<u16>,
-    /// The item sent last.
+    /// The furthest item sent since the last beginning: a late repetition of a request takes nothing back.
     sent: Option<u16>,
     begin_anew: bool,
     /// What it said that may be why it is silent.
@@ -267,7 +267,7 @@ impl Upload {
             });
         }
         if let Some(item) = self.wanted.take().and_then(|seq| self.items.get(usize::from(seq))) {
-            self.sent = Some(item.seq);
+            self.sent = self.sent.max(Some(item.seq));
             out.push(MavMessage::MISSION_ITEM_INT(ardu::MISSION_ITEM_INT_DATA {
                 target_system: to.system(),
                 target_component: to.component(),

@@ -5,4 +5,7 @@ mod failsafes;
 mod flights;
 mod formation;
 mod properties;
+mod payload;
+mod script;
+mod transfers;
 mod world;
