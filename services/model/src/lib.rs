@@ -22,6 +22,7 @@ pub mod fleet;
 pub mod geo;
 pub mod grid_error;
 pub mod id;
+pub mod mav_cmd;
 pub mod mission;
 pub mod plan;
 pub mod rig_yaml;

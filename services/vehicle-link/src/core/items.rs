@@ -4,6 +4,7 @@
 //! On upload the autopilot asks and we answer, so what is lost is asked for again by itself. If it falls silent, it has lost our
 //! last answer and given up, or we its acknowledgement: the upload begins anew, which leaves the same list whatever happened. A
 //! wrong sequence is the autopilot's answer to a repeated item, and no end; that it knows of no upload means to begin anew.
+#![allow(deprecated, reason = "ArduPilot still asks by the old messages")]
 
 use halcyon_model::transfer::ITEMS_MAX;
 use halcyon_model::{Content, Item, ItemFrame, ItemKind, Stamp};

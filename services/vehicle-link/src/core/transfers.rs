@@ -7,6 +7,7 @@
 //! | ArduPilot | every value cast to a float | home, which it keeps itself: added on upload, left out on download |
 //! | PX4 | the value's own bytes in the float's place | the first item |
 //! | others | as their capabilities say; cast, if they don't | the first item |
+#![allow(deprecated, reason = "ArduPilot still asks by the old messages")]
 
 use std::collections::VecDeque;
 

@@ -6,6 +6,4 @@ mod flights;
 mod formation;
 mod properties;
 mod payload;
-mod script;
-mod transfers;
 mod world;

@@ -1,14 +1,18 @@
 //! The transfer protocols against a scripted autopilot behind a bad link.
+#![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "a test")]
+#![allow(deprecated, reason = "ArduPilot still asks by the old messages")]
+
+mod script;
 
 use halcyon_model::{Content, Item, ItemFrame, ItemKind, Parameter, ParameterKind, ParameterName, Stamp};
+use halcyon_vehicle_link::core::commands::Effect;
+use halcyon_vehicle_link::core::encode::Address;
+use halcyon_vehicle_link::core::transfers::{Ending, Request, TransferError, Transfers};
 use mavlink::dialects::ardupilotmega as ardu;
 use mavlink::dialects::ardupilotmega::{MavAutopilot, MavCmd, MavFrame, MavMessage, MavMissionType, MavParamType};
 use proptest::prelude::*;
+use script::{Dice, Script, Wire};
 
-use super::script::{Dice, Script, Wire};
-use crate::core::commands::Effect;
-use crate::core::encode::Address;
-use crate::core::transfers::{Ending, Request, TransferError, Transfers};
 
 const ARDU: MavAutopilot = MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA;
 const PX4: MavAutopilot = MavAutopilot::MAV_AUTOPILOT_PX4;

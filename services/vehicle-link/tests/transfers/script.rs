@@ -10,10 +10,10 @@ use mavlink::dialects::ardupilotmega::{
 
 /// SplitMix64.
 #[derive(Debug, Clone)]
-pub(super) struct Dice(pub(super) u64);
+pub(crate) struct Dice(pub(crate) u64);
 
 impl Dice {
-    pub(super) fn roll(&mut self) -> f64 {
+    pub(crate) fn roll(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -24,19 +24,19 @@ impl Dice {
 
 /// One direction of a link.
 #[derive(Debug)]
-pub(super) struct Wire {
-    pub(super) loss: f64,
-    pub(super) repeats: f64,
-    pub(super) delay_s_max: f64,
+pub(crate) struct Wire {
+    pub(crate) loss: f64,
+    pub(crate) repeats: f64,
+    pub(crate) delay_s_max: f64,
     on_the_way: Vec<(f64, MavMessage)>,
 }
 
 impl Wire {
-    pub(super) fn new(loss: f64, repeats: f64, delay_s_max: f64) -> Self {
+    pub(crate) fn new(loss: f64, repeats: f64, delay_s_max: f64) -> Self {
         Self { loss, repeats, delay_s_max, on_the_way: Vec::new() }
     }
 
-    pub(super) fn send(&mut self, message: MavMessage, now_s: f64, dice: &mut Dice) {
+    pub(crate) fn send(&mut self, message: MavMessage, now_s: f64, dice: &mut Dice) {
         let copies = if dice.roll() < self.repeats { 2 } else { 1 };
         for _ in 0..copies {
             if dice.roll() >= self.loss {
@@ -45,7 +45,7 @@ impl Wire {
         }
     }
 
-    pub(super) fn arrived(&mut self, now_s: f64) -> Vec<MavMessage> {
+    pub(crate) fn arrived(&mut self, now_s: f64) -> Vec<MavMessage> {
         let (mut here, later): (Vec<_>, Vec<_>) = self.on_the_way.drain(..).partition(|(at, _)| *at <= now_s);
         self.on_the_way = later;
         here.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -64,21 +64,21 @@ struct Upload {
 
 /// The autopilot.
 #[derive(Debug)]
-pub(super) struct Script {
-    pub(super) kind: MavAutopilot,
+pub(crate) struct Script {
+    pub(crate) kind: MavAutopilot,
     /// By MAVLink's number of the list; item 0 of a mission included.
-    pub(super) lists: [Vec<ardu::MISSION_ITEM_INT_DATA>; 3],
-    pub(super) parameters: Vec<(String, f32, MavParamType)>,
+    pub(crate) lists: [Vec<ardu::MISSION_ITEM_INT_DATA>; 3],
+    pub(crate) parameters: Vec<(String, f32, MavParamType)>,
     /// It says that it knows no such parameter, as newer ones do.
-    pub(super) says_errors: bool,
+    pub(crate) says_errors: bool,
     /// A parameter that keeps its value.
-    pub(super) stuck: Option<usize>,
+    pub(crate) stuck: Option<usize>,
     /// Refuses items of this command.
-    pub(super) refuses: Option<u32>,
+    pub(crate) refuses: Option<u32>,
     /// How often it was told to stop.
-    pub(super) cancelled: usize,
+    pub(crate) cancelled: usize,
     /// What it was sent.
-    pub(super) heard: Vec<MavMessage>,
+    pub(crate) heard: Vec<MavMessage>,
     upload: Option<Upload>,
     streaming: Option<usize>,
     out: VecDeque<MavMessage>,
@@ -99,7 +99,7 @@ fn kind_of(list: usize) -> MavMissionType {
 }
 
 impl Script {
-    pub(super) fn new(kind: MavAutopilot) -> Self {
+    pub(crate) fn new(kind: MavAutopilot) -> Self {
         Self {
             kind,
             lists: Default::default(),
@@ -156,7 +156,7 @@ impl Script {
         self.parameters.iter().position(|row| row.0 == name)
     }
 
-    pub(super) fn take(&mut self, message: &MavMessage, now_s: f64) {
+    pub(crate) fn take(&mut self, message: &MavMessage, now_s: f64) {
         self.heard.push(message.clone());
         match message {
             MavMessage::PARAM_REQUEST_LIST(_) => self.streaming = Some(0),
@@ -256,7 +256,7 @@ impl Script {
     }
 
     /// What it does by itself: asks again after a second, gives up after eight; streams its parameters.
-    pub(super) fn step(&mut self, now_s: f64) {
+    pub(crate) fn step(&mut self, now_s: f64) {
         if let Some(upload) = &self.upload {
             if now_s - upload.heard_s > 8.0 {
                 self.upload = None;
@@ -271,7 +271,7 @@ impl Script {
         }
     }
 
-    pub(super) fn answers(&mut self) -> Vec<MavMessage> {
+    pub(crate) fn answers(&mut self) -> Vec<MavMessage> {
         self.out.drain(..).collect()
     }
 }
