@@ -3,11 +3,11 @@
 use std::process::ExitCode;
 use std::time::Duration;
 
-use anyhow::Context as _;
 use halcyon_chassis::{ConfigError, process};
 use reqwest::Method;
 use serde_json::{Value, json};
 
+use super::client::{Client, text};
 use super::output;
 
 /// Create, watch and command missions of a running fleet
@@ -89,31 +89,8 @@ enum Command {
     },
 }
 
-struct Client {
-    http: reqwest::Client,
-    url: String,
-}
-
-impl Client {
-    async fn send(&self, method: Method, path: &str, body: Option<Value>) -> anyhow::Result<Value> {
-        let request = self.http.request(method, format!("{}/api/v1/{path}", self.url.trim_end_matches('/')));
-        let request = if let Some(body) = body { request.json(&body) } else { request };
-        let response = request.send().await.with_context(|| format!("no gateway answers at {}; is the fleet up?", self.url))?;
-        let status = response.status();
-        let text = response.text().await.context("the gateway's answer broke off")?;
-        let value: Value = serde_json::from_str(&text).unwrap_or(Value::Null);
-        if status.is_success() {
-            return Ok(value);
-        }
-        let told = |key: &str| value.get(key).and_then(Value::as_str).filter(|text| !text.is_empty());
-        anyhow::bail!("{}", told("detail").or(told("title")).unwrap_or(status.as_str()))
-    }
-}
-
 pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
-    reqwest::Url::parse(&args.url).map_err(|error| ConfigError::new(format!("--url {:?}: {error}", args.url)))?;
-    let http = reqwest::Client::builder().timeout(Duration::from_secs(15)).no_proxy().build()?;
-    let client = Client { http, url: args.url };
+    let client = Client::new(args.url, Duration::from_secs(15))?;
     process::runtime()?.block_on(command(&client, args.command, args.json))
 }
 
@@ -166,10 +143,6 @@ async fn command(client: &Client, command: Command, json: bool) -> anyhow::Resul
 fn path(id: &str, verb: &str) -> anyhow::Result<String> {
     let id = halcyon_model::MissionId::new(id).map_err(|error| ConfigError::new(error.to_string()))?;
     Ok(if verb.is_empty() { format!("missions/{id}") } else { format!("missions/{id}/{verb}") })
-}
-
-fn text<'a>(mission: &'a Value, key: &str) -> &'a str {
-    mission[key].as_str().unwrap_or("-")
 }
 
 fn summary(mission: &Value) -> String {

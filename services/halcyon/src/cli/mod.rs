@@ -2,6 +2,7 @@
 
 mod bench;
 mod calibrate;
+mod client;
 mod config;
 mod features;
 mod lab;
@@ -16,6 +17,7 @@ mod sim;
 mod survey;
 mod up;
 mod usage;
+mod vehicle;
 mod waves;
 
 use std::process::ExitCode;
@@ -63,6 +65,8 @@ enum Command {
     Lab(lab::Args),
     /// Create, watch and command missions of a running fleet
     Mission(mission::Args),
+    /// Look at, command and set up the vehicles of a running fleet: parameters, missions, fences, payload
+    Vehicle(vehicle::Args),
     /// Simulate: render water to a survey folder, or serve vehicles over MAVLink
     Sim(sim::Args),
     /// Print the effective configuration, and where each value came from
@@ -94,6 +98,7 @@ pub fn main() -> ExitCode {
         Command::Bench(args) => bench::run(&args),
         Command::Lab(args) => lab::run(&args),
         Command::Mission(args) => mission::run(args),
+        Command::Vehicle(args) => vehicle::run(args),
         Command::Sim(args) => sim::run(&options, args),
         Command::Config(args) => config::run(&options, &args),
     };
