@@ -3,6 +3,7 @@
 #![allow(deprecated, reason = "ArduPilot still asks by the old messages")]
 
 mod script;
+mod simulator;
 
 use halcyon_model::{Content, Item, ItemFrame, ItemKind, Parameter, ParameterKind, ParameterName, Stamp};
 use halcyon_vehicle_link::core::commands::Effect;
@@ -242,6 +243,7 @@ fn a_cancellation_ends_those_under_way_and_those_that_wait_and_tells_the_autopil
         bench.step(tick);
     }
     assert_eq!((bench.script.cancelled, bench.script.lists[0].len()), (1, 0));
+    bench.endings.clear();
     // And it's free for the next.
     assert!(bench.run(Request::Upload(ItemKind::Mission, items(ItemKind::Mission, 3)), 60.0).0.is_ok());
 }
