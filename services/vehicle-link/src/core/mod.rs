@@ -8,15 +8,19 @@ pub mod failsafe;
 pub mod guidance;
 pub mod interlock;
 pub mod inverse;
+pub mod items;
 pub mod law;
 pub mod limits;
 pub mod local;
 pub mod observer;
+pub mod parameters;
+pub mod payload;
 pub mod separation;
 pub mod streams;
 pub mod telemetry;
 pub mod text;
 pub mod track;
+pub mod transfers;
 
 #[cfg(test)]
 mod tests;

@@ -153,6 +153,7 @@ impl Follower {
             limits,
             fail_safe: config.fail_safe,
             guidance: crate::core::guidance::Guidance { law: scenario.law, slot_lock: scenario.slot_lock, ..config.guidance },
+            payload: config.payload,
             home_height_m: config.home_height_m,
             frame: FleetOrigin(Geodetic::from_deg(53.1, -2.9, 40.0)).frame(),
         });

@@ -25,6 +25,7 @@ mod flight;
 mod goal;
 mod ground;
 mod intake;
+mod payload;
 mod settle;
 mod slot;
 
@@ -46,7 +47,9 @@ use super::guidance::{Guidance, Reference, Setpoint};
 use super::interlock::mode_name;
 use super::inverse::Inverse;
 use super::limits::{FailSafeLimits, Limits};
+use super::payload::Payload;
 use super::track::Track;
+use payload::Release;
 use settle::Settle;
 
 /// After a restart in flight, so long without a plan or a command is a lapsed plan, seconds.
@@ -67,6 +70,8 @@ pub struct ExecutorConfig {
     pub fail_safe: FailSafeLimits,
     /// How slots are kept.
     pub guidance: Guidance,
+    /// What holds the payload.
+    pub payload: Payload,
     /// Height of home above mean water, metres.
     pub home_height_m: f64,
     /// The fleet's frame.
@@ -165,6 +170,7 @@ pub struct Executor {
     uncleared: Option<Stamp>,
     landed_for_goal: bool,
     touchdown: Option<LocalPoint>,
+    release: Release,
     stepped: Option<Stamp>,
     active: Option<Goal>,
     /// The goal that the last step in the air flew: the active one, or a fail-safe's.
@@ -206,6 +212,7 @@ impl Executor {
             uncleared: None,
             landed_for_goal: false,
             touchdown: None,
+            release: Release::default(),
             stepped: None,
             active: None,
             flying: None,
@@ -310,6 +317,7 @@ impl Executor {
 
     /// How a request ended.
     pub fn observe_outcome(&mut self, command: &Command, outcome: &Result<(), CommandError>, now: Stamp) {
+        self.observe_payload(command, outcome);
         let ours = self.pending.as_ref().is_some_and(|pending| pending.command == *command);
         if let (true, Err(error)) = (ours, outcome) {
             self.pending = Some(Pending { command: *command, at: now, refused: true });
@@ -373,6 +381,7 @@ impl Executor {
             self.fly(&own.state, goal, dt_s, now, outputs);
         } else {
             self.stand(&own.state, goal, now, outputs);
+            self.release_on_touchdown(&own.state, now, outputs);
         }
     }
 
@@ -543,5 +552,7 @@ fn describe(command: &Command) -> String {
         Command::SetMode(mode) => format!("mode {}", mode_name(*mode)),
         Command::TakeOff { height_above_home_m } => format!("take-off to {height_above_home_m:.1} m"),
         Command::SetInterval(stream) => format!("the stream of message {}", stream.message_id),
+        Command::Payload(payload) if payload.releases => "releasing the payload".into(),
+        Command::Payload(_) => "securing the payload".into(),
     }
 }

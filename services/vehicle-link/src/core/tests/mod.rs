@@ -5,4 +5,5 @@ mod failsafes;
 mod flights;
 mod formation;
 mod properties;
+mod payload;
 mod world;

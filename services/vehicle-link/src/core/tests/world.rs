@@ -10,6 +10,7 @@ use crate::core::commands::Command;
 use crate::core::executor::{Decision, Executor, ExecutorConfig, Note, Output, PlanAnswer};
 use crate::core::guidance::{Guidance, Setpoint};
 use crate::core::limits::{FailSafeLimits, Limits};
+use crate::core::payload::Payload;
 
 pub(super) const DT_S: f64 = 0.1;
 
@@ -38,6 +39,7 @@ pub(super) struct Copter {
     pub(super) ready: bool,
     /// Nothing is heard from it.
     pub(super) silent: bool,
+    pub(super) holds_payload: bool,
     home: Vector3<f64>,
     climb_to: Option<f64>,
     setpoint: Option<Setpoint>,
@@ -64,6 +66,7 @@ impl Copter {
                 self.climb_to = Some(height_above_home_m - self.home.z);
             }
             Command::SetInterval(_) => {}
+            Command::Payload(payload) => self.holds_payload = !payload.releases,
             Command::Arm | Command::Disarm { .. } | Command::TakeOff { .. } => return no("failed"),
         }
         Ok(())
@@ -169,6 +172,7 @@ pub(super) fn config(name: &str) -> ExecutorConfig {
         limits: Limits::default(),
         fail_safe: FailSafeLimits::default(),
         guidance: Guidance::default(),
+        payload: Payload::default(),
         home_height_m: 0.0,
         frame: origin().frame(),
     }
@@ -188,6 +192,7 @@ impl World {
             estimator_ok: true,
             ready: true,
             silent: false,
+            holds_payload: true,
             home: Vector3::new(home.0, home.1, 0.0),
             climb_to: None,
             setpoint: None,
