@@ -179,6 +179,10 @@ impl Autopilot {
         if self.landed || matches!(self.guided, Guided::TakeOff { .. }) {
             return;
         }
+        // A place outside the fence is not gone to; what was under way goes on.
+        if parts.ned_m.is_some_and(|ned_m| !self.fence_allows(ned_m)) {
+            return;
+        }
         let none = Vector3::zeros();
         self.guided = match (parts.ned_m, parts.velocity_mps, parts.acceleration_mps2) {
             (Some(ned_m), Some(velocity_mps), acceleration) => {
