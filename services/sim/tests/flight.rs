@@ -193,6 +193,25 @@ fn it_lands_on_waves_and_floats_with_them() {
     }
 }
 
+/// As ArduCopter's: it wants less than 1 m/s² below 1 Hz for a second, and short steep waves throw it about by more than that.
+#[test]
+fn steep_waves_keep_the_land_detector_waiting() {
+    let mut field = Field::new(&real());
+    field.take_off(5.0);
+    let wave = |stamp: Stamp| 0.25 * (std::f64::consts::TAU * (stamp.as_nanos() % 2_000_000_000) as f64 / 2e9).sin();
+    field.water = Box::new(move |_, stamp| wave(stamp));
+    field.target(POSITION, [20.0, 0.0, -5.0], [0.0; 3]);
+    field.run(15.0);
+    field.set_mode(Mode::Land);
+    field.until(40.0, "touchdown", |vehicle| vehicle.truth().landed);
+    field.run(30.0);
+    assert!(field.vehicle.autopilot().is_armed() && !field.vehicle.autopilot().is_landed());
+    // Only by force, as for any vehicle in the air.
+    let [disarm, force] = [0.0, 21_196.0].map(|magic| [0.0, magic, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    assert_eq!(field.command(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, disarm), MavResult::MAV_RESULT_FAILED);
+    assert_eq!(field.command(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, force), MavResult::MAV_RESULT_ACCEPTED);
+}
+
 #[test]
 fn rtl_climbs_returns_and_lands_at_home() {
     let mut field = Field::new(&perfect());

@@ -41,7 +41,7 @@ enum Gripper {
 /// The state of all of it.
 #[derive(Debug, Clone)]
 pub(super) struct Payload {
-    /// Commanded by MAV_CMD_DO_SET_SERVO.
+    /// Pulse widths last commanded, microseconds; 0 before any.
     servos_us: [u16; OUTPUTS],
     gripper: Gripper,
     relays: [bool; RELAYS.len()],
@@ -58,15 +58,11 @@ impl Autopilot {
     #[must_use]
     pub fn servo_us(&self, output: usize) -> u16 {
         let Some(index) = output.checked_sub(1) else { return 0 };
-        if self.output_function(index) == Some(FUNCTION_GRIPPER) && self.params.get(Param::GripperEnable) != 0.0 {
-            let param = match self.payload.gripper {
-                Gripper::Neutral => Param::GripperNeutral,
-                Gripper::Moving { grabs: true, .. } | Gripper::Still { grabs: true } => Param::GripperGrab,
-                Gripper::Moving { grabs: false, .. } | Gripper::Still { grabs: false } => Param::GripperRelease,
-            };
-            return self.params.get(param) as u16;
+        let is_gripper = self.output_function(index) == Some(FUNCTION_GRIPPER) && self.params.get(Param::GripperEnable) != 0.0;
+        match self.payload.servos_us.get(index).copied().unwrap_or(0) {
+            0 if is_gripper => self.params.get(Param::GripperNeutral) as u16,
+            width_us => width_us,
         }
-        self.payload.servos_us.get(index).copied().unwrap_or(0)
     }
 
     /// SERVOn_FUNCTION of an output by its index; `None` for a propeller or none at all.
@@ -106,16 +102,27 @@ impl Autopilot {
             1 => true,
             _ => return mav::MavResult::MAV_RESULT_FAILED,
         };
-        let already = match self.payload.gripper {
-            Gripper::Neutral => false,
-            Gripper::Moving { grabs: now, .. } | Gripper::Still { grabs: now } => now == grabs,
-        };
-        if !already {
-            self.payload.gripper = Gripper::Moving { grabs, since: self.now };
-            let text = if grabs { "Gripper load grabbing" } else { "Gripper load releasing" };
-            self.text(mav::MavSeverity::MAV_SEVERITY_INFO, text);
+        match self.payload.gripper {
+            Gripper::Moving { grabs: now, .. } if now == grabs => {}
+            Gripper::Still { grabs: now } if now == grabs => self.tell_gripper(grabs),
+            _ => {
+                self.payload.gripper = Gripper::Moving { grabs, since: self.now };
+                let width_us = self.params.get(if grabs { Param::GripperGrab } else { Param::GripperRelease }) as u16;
+                for index in MOTORS..OUTPUTS {
+                    if self.output_function(index) == Some(FUNCTION_GRIPPER) {
+                        self.payload.servos_us[index] = width_us;
+                    }
+                }
+                let text = if grabs { "Gripper load grabbing" } else { "Gripper load releasing" };
+                self.text(mav::MavSeverity::MAV_SEVERITY_INFO, text);
+            }
         }
         mav::MavResult::MAV_RESULT_ACCEPTED
+    }
+
+    fn tell_gripper(&mut self, grabs: bool) {
+        let text = if grabs { "Gripper load grabbed" } else { "Gripper load released" };
+        self.text(mav::MavSeverity::MAV_SEVERITY_INFO, text);
     }
 
     /// Says that the gripper has arrived.
@@ -124,8 +131,7 @@ impl Autopilot {
             && self.now.seconds_since(since) >= GRIPPER_MOVES_S
         {
             self.payload.gripper = Gripper::Still { grabs };
-            let text = if grabs { "Gripper load grabbed" } else { "Gripper load released" };
-            self.text(mav::MavSeverity::MAV_SEVERITY_INFO, text);
+            self.tell_gripper(grabs);
         }
     }
 
