@@ -157,6 +157,27 @@ fn on_the_ground_a_target_lifts_nothing_and_nonsense_is_ignored() {
 }
 
 #[test]
+fn a_target_ends_a_take_off() {
+    let mut field = Field::new(&perfect());
+    field.run(3.0);
+    field.set_mode(Mode::Guided);
+    assert_eq!(field.arm(), MavResult::MAV_RESULT_ACCEPTED);
+    let up = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 8.0];
+    assert_eq!(field.command(MavCmd::MAV_CMD_NAV_TAKEOFF, up), MavResult::MAV_RESULT_ACCEPTED);
+    // Before it has lifted off: it stays on the ground.
+    field.target(POSITION, [0.0, 0.0, -8.0], [0.0; 3]);
+    field.run(3.0);
+    assert!(field.vehicle.truth().position_ned_m.z > -0.05);
+    // On the way up: it goes there instead.
+    assert_eq!(field.command(MavCmd::MAV_CMD_NAV_TAKEOFF, up), MavResult::MAV_RESULT_ACCEPTED);
+    field.until(10.0, "lift-off", |vehicle| vehicle.truth().position_ned_m.z < -2.0);
+    field.target(POSITION, [6.0, 0.0, -4.0], [0.0; 3]);
+    field.run(10.0);
+    let off_m = field.vehicle.truth().position_ned_m - nalgebra::Vector3::new(6.0, 0.0, -4.0);
+    assert!(off_m.norm() < 0.2, "{off_m}");
+}
+
+#[test]
 fn land_touches_down_gently_and_disarms() {
     let mut field = Field::new(&real());
     field.take_off(5.0);

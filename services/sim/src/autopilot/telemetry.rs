@@ -349,10 +349,10 @@ impl Autopilot {
         }))
     }
 
-    /// Where GUIDED is going, on the map.
+    /// Where GUIDED is going, on the map, while it goes to a place at rest.
     fn global_setpoint(&self) -> Option<MavMessage> {
         let ned_m = match self.guided {
-            Guided::Position { ned_m } | Guided::Moving { ned_m, .. } if self.mode == Mode::Guided => ned_m,
+            Guided::Position { ned_m } if self.mode == Mode::Guided => ned_m,
             _ => return None,
         };
         let (lat_int, lon_int, altitude_m) = self.global_e7(ned_m);
