@@ -48,7 +48,7 @@ impl Craft {
             .take_outbox()
             .filter_map(|(_, outbound)| match outbound {
                 Outbound::Message(message) => Some(message),
-                Outbound::Unsupported(_) => None,
+                Outbound::Acknowledgement(_) => None,
             })
             .collect();
         for message in said {
