@@ -1,11 +1,13 @@
 //! The pure core: synchronous, deterministic, takes `now`, does no I/O.
 
 pub mod commands;
+pub mod continuity;
 pub mod control;
 pub mod encode;
 pub mod executor;
 pub mod failsafe;
 pub mod guidance;
+pub mod intent;
 pub mod interlock;
 pub mod inverse;
 pub mod items;

@@ -98,12 +98,13 @@ impl Sighting {
 pub(super) struct Leader {
     craft: Craft,
     pilot: Pilot,
+    shares_intent: bool,
 }
 
 impl Leader {
     pub(super) fn new(scenario: &Scenario, now: Stamp) -> Result<Self, String> {
         let (craft, _) = Craft::new(scenario, 0, now)?;
-        Ok(Self { craft, pilot: Pilot::new(scenario.flight) })
+        Ok(Self { craft, pilot: Pilot::new(scenario.flight), shares_intent: scenario.shares_intent })
     }
 
     pub(super) fn craft(&self) -> &Craft {
@@ -115,7 +116,9 @@ impl Leader {
     }
 
     pub(super) fn state(&self, now: Stamp) -> Option<VehicleState> {
-        self.craft.link.state(now).map(|(state, _)| state)
+        let (mut state, _) = self.craft.link.state(now)?;
+        state.intent = self.pilot.intent().filter(|_| self.shares_intent);
+        Some(state)
     }
 
     pub(super) fn airborne(&self) -> bool {

@@ -32,7 +32,7 @@ mod slot;
 use std::collections::BTreeMap;
 
 use halcyon_model::{
-    Activity, FlightMode, LandedState, LocalFrame, LocalPoint, Severity, Slot, Stamp, VehicleId, VehicleState,
+    Activity, FlightMode, Intent, LandedState, LocalFrame, LocalPoint, Severity, Slot, Stamp, VehicleId, VehicleState,
 };
 use nalgebra::Vector3;
 
@@ -41,6 +41,7 @@ pub use goal::Goal;
 pub use intake::PlanAnswer;
 
 use super::commands::{Command, CommandError};
+use super::continuity::Continuity;
 use super::control::{Change, Control};
 use super::failsafe::{FailSafes, PlanHealth};
 use super::guidance::{Guidance, Reference, Setpoint};
@@ -56,6 +57,8 @@ use settle::Settle;
 pub const RESTART_GRACE_S: f64 = 10.0;
 /// A request that was refused or unanswered is made again after this time, seconds.
 const AGAIN_S: f64 = 5.0;
+/// What was asked of the autopilot is what the vehicle means to do for so long, seconds.
+const INTENT_S_MAX: f64 = 0.5;
 /// Neighbours remembered; the fleet is smaller.
 const NEIGHBOURS_MAX: usize = 64;
 
@@ -161,6 +164,10 @@ pub struct Executor {
     /// What is left between the reference and the slot that it has joined, metres.
     slot_left_m: Option<Vector3<f64>>,
     inverse: Inverse,
+    /// The vehicle's own place, short of its receiver's leaps: what formation is flown by.
+    continuity: Continuity,
+    /// What was last asked of the autopilot, for those who follow.
+    intent: Option<Intent>,
     /// Who follows whom where, by the newest plan.
     formation: BTreeMap<VehicleId, (VehicleId, Slot)>,
     held: Option<Vector3<f64>>,
@@ -205,6 +212,8 @@ impl Executor {
             reference: None,
             slot_left_m: None,
             inverse: Inverse::default(),
+            continuity: Continuity::default(),
+            intent: None,
             formation: BTreeMap::new(),
             held: None,
             settle: Settle::default(),
@@ -254,6 +263,8 @@ impl Executor {
         state.activity = self.activity.clone();
         state.plan_generation = self.plan_generation();
         state.touchdown = self.touchdown;
+        let in_force = |intent: &Intent| state.stamp.seconds_since(intent.stamp).abs() <= INTENT_S_MAX;
+        state.intent = self.intent.filter(|intent| state.mode == FlightMode::Guided && in_force(intent));
     }
 
     /// Whether this vehicle keeps a slot beside `other` now: news of it is worth a step at once.
@@ -302,6 +313,7 @@ impl Executor {
         if first && self.airborne {
             self.restarted_at = Some(now);
         }
+        self.continuity.observe(state.stamp, state.position_ned_m, state.velocity_ned_mps);
         self.own = Some(Own { state, mode_heard });
         if was_airborne && !self.airborne {
             self.touched_down();
@@ -347,6 +359,10 @@ impl Executor {
             Some(own) => self.step_with(&own, dt_s, now, &mut outputs),
         }
         self.note_change(&before);
+        self.intent = outputs.iter().rev().find_map(|output| match output {
+            Output::Setpoint(setpoint) => Some(setpoint.intent(now)),
+            _ => None,
+        });
         outputs.extend(self.notes.drain(..).map(Output::Note));
         outputs
     }
