@@ -80,7 +80,8 @@ fn health(host: &str) -> Health {
 
 fn plan() -> DispatchPlan {
     let (point, leader) = (LocalPoint::new(30.0, 40.0), VehicleId::new("leader-1").unwrap());
-    let clearance = Clearance { verdict: VerdictState::Safe, sea_state_stamp: at(-0.1), valid_until: at(3.0) };
+    let clearance =
+        Clearance { verdict: VerdictState::Safe, sea_state_stamp: at(-0.1), valid_until: at(3.0), windows: Vec::new() };
     let assign = |id: &str, task| Assignment { vehicle: VehicleId::new(id).unwrap(), task };
     DispatchPlan {
         stamp: at(-0.1),

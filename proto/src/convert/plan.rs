@@ -1,7 +1,7 @@
 use halcyon_model::{Assignment, Clearance, DispatchPlan, Slot, Stamp, Task};
 
 use super::geo::{point_from, point_to};
-use super::sea::{verdict_state_from, verdict_state_to};
+use super::sea::{verdict_state_from, verdict_state_to, window_from, window_to};
 use crate::field::{
     FieldError, Within, finite, header, id, optional, optional_id, optionally, positive, required, unspecified,
 };
@@ -19,11 +19,15 @@ pub(super) fn slot_from(proto: v1::Slot) -> Result<Slot, FieldError> {
     })
 }
 
+/// More calm windows than this are not taken: the soonest count.
+const WINDOWS_MAX: usize = 8;
+
 fn clearance_from(proto: v1::Clearance) -> Result<Clearance, FieldError> {
     Ok(Clearance {
         verdict: verdict_state_from("verdict", proto.verdict)?.ok_or_else(|| unspecified("verdict"))?,
         sea_state_stamp: Stamp::from_nanos(proto.sea_state_stamp_ns),
         valid_until: Stamp::from_nanos(proto.valid_until_ns),
+        windows: proto.windows.into_iter().take(WINDOWS_MAX).map(window_from).collect::<Result<_, _>>()?,
     })
 }
 
@@ -44,6 +48,7 @@ fn task_to(task: &Task) -> v1::assignment::Task {
                 verdict: verdict_state_to(clearance.verdict),
                 sea_state_stamp_ns: clearance.sea_state_stamp.as_nanos(),
                 valid_until_ns: clearance.valid_until.as_nanos(),
+                windows: clearance.windows.iter().map(window_to).collect(),
             }),
         }),
         Task::Return => Wired::ReturnHome(v1::ReturnTask {}),
@@ -110,5 +115,37 @@ impl Wire for DispatchPlan {
             valid_until: Stamp::from_nanos(proto.valid_until_ns),
             assignments,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use halcyon_model::{CalmWindow, VerdictState};
+
+    use super::*;
+
+    #[test]
+    fn a_clearances_windows_travel_and_no_more_than_count() {
+        let t = |s: f64| Stamp::from_secs_f64(1000.0 + s);
+        let window = |index: u32| CalmWindow { from: t(f64::from(index)), to: t(f64::from(index) + 0.5) };
+        let given = |count: u32| Task::Land {
+            point: halcyon_model::LocalPoint::new(1.0, 2.0),
+            approach_height_m: 5.0,
+            clearance: Some(Clearance {
+                verdict: VerdictState::Safe,
+                sea_state_stamp: t(0.0),
+                valid_until: t(9.0),
+                windows: (0..count).map(window).collect(),
+            }),
+        };
+        for count in [0, 3, WINDOWS_MAX as u32] {
+            assert_eq!(task_from(task_to(&given(count))), Ok(given(count)));
+        }
+        assert_eq!(task_from(task_to(&given(20))), Ok(given(WINDOWS_MAX as u32)));
+        let mut backwards = given(1);
+        if let Task::Land { clearance: Some(clearance), .. } = &mut backwards {
+            clearance.windows = vec![CalmWindow { from: t(2.0), to: t(1.0) }];
+        }
+        assert!(task_from(task_to(&backwards)).is_err());
     }
 }

@@ -110,26 +110,30 @@ fn spectrum_from(proto: v1::WaveSpectrum) -> Result<WaveSpectrum, FieldError> {
     })
 }
 
+pub(super) fn window_to(window: &CalmWindow) -> v1::CalmWindow {
+    v1::CalmWindow { from_ns: window.from.as_nanos(), to_ns: window.to.as_nanos() }
+}
+
+pub(super) fn window_from(proto: v1::CalmWindow) -> Result<CalmWindow, FieldError> {
+    let window = CalmWindow { from: Stamp::from_nanos(proto.from_ns), to: Stamp::from_nanos(proto.to_ns) };
+    if window.from <= window.to { Ok(window) } else { Err(FieldError::new("windows", "ends before it begins")) }
+}
+
 fn calm_to(calm: &CalmForecast) -> v1::CalmForecast {
-    let window = |window: &CalmWindow| v1::CalmWindow { from_ns: window.from.as_nanos(), to_ns: window.to.as_nanos() };
     v1::CalmForecast {
         place: Some(point_to(&calm.place)),
         from_ns: calm.from.as_nanos(),
         error_share: calm.error_share,
-        windows: calm.windows.iter().map(window).collect(),
+        windows: calm.windows.iter().map(window_to).collect(),
     }
 }
 
 fn calm_from(proto: v1::CalmForecast) -> Result<CalmForecast, FieldError> {
-    let window = |proto: v1::CalmWindow| {
-        let window = CalmWindow { from: Stamp::from_nanos(proto.from_ns), to: Stamp::from_nanos(proto.to_ns) };
-        if window.from <= window.to { Ok(window) } else { Err(FieldError::new("windows", "ends before it begins")) }
-    };
     Ok(CalmForecast {
         place: required("place", proto.place, point_from)?,
         from: Stamp::from_nanos(proto.from_ns),
         error_share: non_negative("error_share", proto.error_share)?,
-        windows: proto.windows.into_iter().map(window).collect::<Result<_, _>>()?,
+        windows: proto.windows.into_iter().map(window_from).collect::<Result<_, _>>()?,
     })
 }
 

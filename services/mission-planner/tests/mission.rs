@@ -4,7 +4,7 @@ mod common;
 
 use common::{World, id, manual, mission_id, spec};
 use halcyon_mission_planner::Config;
-use halcyon_model::{Activity, LocalPoint, MissionAction, MissionPhase, Role, Task, VerdictState};
+use halcyon_model::{Activity, CalmForecast, CalmWindow, LocalPoint, MissionAction, MissionPhase, Role, Task, VerdictState};
 
 use MissionPhase::{
     Aborted, Approved, Assessing, AwaitingApproval, Clearing, Completed, Failed, Joining, Landing, Paused, Transit, Waiting,
@@ -368,6 +368,31 @@ fn when_the_verdict_turns_the_clearance_goes_with_the_next_plan() {
         world.run(60.0);
         assert!(world.vehicles.iter().all(|vehicle| vehicle.place().distance_m(&vehicle.home) < 1.0));
     }
+}
+
+/// A forecast of calm goes with the clearance if it is of the spot, knows something, and isn't over.
+#[test]
+fn a_clearance_carries_the_calm_windows_of_its_own_spot() {
+    let mut world = world_in(Landing);
+    let Some(Task::Land { point: spot, .. }) = world.task("follower-1").cloned() else { panic!("not landing") };
+    let window = |world: &World, from_s: f64, to_s: f64| CalmWindow {
+        from: world.now.plus_secs_f64(from_s),
+        to: world.now.plus_secs_f64(to_s),
+    };
+    let mut offered = |aside_m: f64, error_share: f64| {
+        let windows = vec![window(&world, -5.0, -3.0), window(&world, 2.0, 4.5), window(&world, 6.0, 9.0)];
+        let place = LocalPoint::new(spot.north_m + aside_m, spot.east_m);
+        world.calm = Some(CalmForecast { place, from: world.now, error_share, windows: windows.clone() });
+        world.run(1.4);
+        let Some(Task::Land { clearance: Some(clearance), .. }) = world.task("follower-1").cloned() else {
+            panic!("not cleared")
+        };
+        (clearance.windows, windows[1..].to_vec())
+    };
+    let (given, expected) = offered(1.0, 0.3);
+    assert_eq!(given, expected);
+    assert_eq!(offered(12.0, 0.3).0, []);
+    assert_eq!(offered(1.0, 0.9).0, []);
 }
 
 #[test]

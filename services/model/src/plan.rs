@@ -2,7 +2,7 @@
 
 use crate::geo::LocalPoint;
 use crate::id::{MissionId, VehicleId};
-use crate::sea::VerdictState;
+use crate::sea::{CalmWindow, VerdictState};
 use crate::time::Stamp;
 
 /// A place beside a leader, in the leader's heading frame. Line abreast at separation S (thesis 6-1 … 6-8) is
@@ -18,7 +18,7 @@ pub struct Slot {
 }
 
 /// Permission to descend, and how long it lasts.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Clearance {
     /// The verdict it rests on. Only `Safe` lets a vehicle descend.
     pub verdict: VerdictState,
@@ -26,6 +26,8 @@ pub struct Clearance {
     pub sea_state_stamp: Stamp,
     /// After this the vehicle stops and climbs.
     pub valid_until: Stamp,
+    /// Quiet moments ahead at the spot, soonest first, to touch down in: an improvement, never a condition. Empty where none is known.
+    pub windows: Vec<CalmWindow>,
 }
 
 /// What one vehicle is to do.

@@ -180,6 +180,7 @@ impl<'a> Service<'a> {
                     let ended = self.autopilot.withdraw();
                     self.carry_out(ended, link).await;
                 }
+                Output::AskStreams => self.autopilot.started_again(),
                 Output::Note(note) => self.event(EventDraft::new(note.severity, note.what, note.why)).await,
             }
         }
@@ -287,7 +288,10 @@ impl<'a> Service<'a> {
                     Err(error) => CommandReply::refused(now, error.to_string()),
                 }
             }
-            Decision::Ask(_) if self.waiting.len() >= WAITING_MAX => CommandReply::refused(now, CommandError::Busy.to_string()),
+            // A termination waits for no place.
+            Decision::Ask(command) if self.waiting.len() >= WAITING_MAX && command != (Command::Disarm { force: true }) => {
+                CommandReply::refused(now, CommandError::Busy.to_string())
+            }
             Decision::Ask(command) => {
                 let ticket = self.next_ticket;
                 self.next_ticket += 1;

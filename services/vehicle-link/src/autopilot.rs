@@ -173,6 +173,12 @@ impl Autopilot {
         self.transfers.progress()
     }
 
+    /// The autopilot started again: its streams are asked for afresh, and its local frame is another.
+    pub fn started_again(&mut self) {
+        self.local = LocalFinder::default();
+        self.streams = Streams::default();
+    }
+
     /// What is due: commands to send or to end, streams to ask for.
     pub fn poll(&mut self, now: Stamp) -> Vec<Effect> {
         let Some(address) = self.address else { return Vec::new() };

@@ -71,7 +71,7 @@ impl PlanTask {
             model::Task::Land { point, approach_height_m, clearance } => Self::Land {
                 point: edge.point(*point),
                 approach_height_m: *approach_height_m,
-                clearance: clearance.map(|clearance| LandingClearance {
+                clearance: clearance.as_ref().map(|clearance| LandingClearance {
                     verdict: clearance.verdict.into(),
                     sea_state_stamp: rfc3339(clearance.sea_state_stamp),
                     valid_until: rfc3339(clearance.valid_until),

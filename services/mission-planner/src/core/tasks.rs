@@ -1,9 +1,18 @@
 //! What each vehicle of a mission is to do in its phase, and the permission to descend.
 
-use halcyon_model::{Assignment, Clearance, LocalPoint, MissionPhase, Task, VehicleId, VerdictState};
+use halcyon_model::{
+    Assignment, CalmForecast, CalmWindow, Clearance, LocalPoint, MissionPhase, SeaState, Stamp, Task, VehicleId, VerdictState,
+};
 
 use super::flow::occupied;
 use super::live::{Live, World};
+
+/// A forecast of calm is passed on if it is of a place this near to the spot, metres: further, other waves come.
+const CALM_WITHIN_M: f64 = 3.0;
+/// And if its error is at most this share of the sea's own standard deviation: at 1 nothing is known.
+const CALM_ERROR_SHARE_MAX: f64 = 0.6;
+/// So many windows at most: the soonest.
+const WINDOWS_MAX: usize = 8;
 
 /// The assignments of a mission's crew, leader first.
 pub(super) fn assignments(live: &Live, world: &World<'_>) -> Vec<Assignment> {
@@ -48,7 +57,21 @@ pub(super) fn clearance(live: &Live, world: &World<'_>) -> Option<Clearance> {
         return None;
     }
     let valid_until = sea.verdict.valid_until.min(sea.stamp.plus_secs_f64(world.config.clearance_s));
-    (valid_until > world.now).then_some(Clearance { verdict: VerdictState::Safe, sea_state_stamp: sea.stamp, valid_until })
+    let windows = calm_windows(live, sea, world.now);
+    (valid_until > world.now).then_some(Clearance {
+        verdict: VerdictState::Safe,
+        sea_state_stamp: sea.stamp,
+        valid_until,
+        windows,
+    })
+}
+
+/// Quiet moments ahead at the spot, if the forecast is of the spot and knows more than that the sea has waves.
+fn calm_windows(live: &Live, sea: &SeaState, now: Stamp) -> Vec<CalmWindow> {
+    let useful =
+        |calm: &&CalmForecast| calm.place.distance_m(&live.spot()) <= CALM_WITHIN_M && calm.error_share <= CALM_ERROR_SHARE_MAX;
+    let Some(calm) = sea.calm.as_ref().filter(useful) else { return Vec::new() };
+    calm.windows.iter().filter(|window| window.to > now).take(WINDOWS_MAX).copied().collect()
 }
 
 /// Why there is no clearance, for people.

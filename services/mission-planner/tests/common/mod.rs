@@ -12,8 +12,8 @@ use halcyon_mission_planner::Config;
 use halcyon_mission_planner::core::{Effects, Notice, Planner, Record};
 use halcyon_mission_planner::store::Store;
 use halcyon_model::{
-    Approval, CommandReply, Estimate, LocalPoint, Mission, MissionAction, MissionCommand, MissionId, MissionPhase, MissionSpec,
-    RigId, Role, SeaState, Stamp, Task, VehicleId, Verdict, VerdictReason, VerdictState,
+    Approval, CalmForecast, CommandReply, Estimate, LocalPoint, Mission, MissionAction, MissionCommand, MissionId,
+    MissionPhase, MissionSpec, RigId, Role, SeaState, Stamp, Task, VehicleId, Verdict, VerdictReason, VerdictState,
 };
 
 pub use vehicle::FakeVehicle;
@@ -33,6 +33,8 @@ pub struct World {
     pub vehicles: Vec<FakeVehicle>,
     /// The verdict on all water; `None`: wave assessment is silent.
     pub verdict: Option<VerdictState>,
+    /// What each sea state says of the next seconds.
+    pub calm: Option<CalmForecast>,
     pub seas: Vec<SeaState>,
     next_sea: Stamp,
     pub missions: Vec<Mission>,
@@ -97,6 +99,7 @@ impl World {
             now,
             vehicles,
             verdict: Some(VerdictState::Safe),
+            calm: None,
             seas: Vec::new(),
             next_sea: now,
             missions: Vec::new(),
@@ -233,7 +236,8 @@ impl World {
             .filter(|vehicle| vehicle.role == Role::Leader && vehicle.airborne())
             .map(|vehicle| sea(&vehicle.id, vehicle.place(), self.now, vehicle.at_height_since.unwrap_or(self.now), verdict))
             .collect();
-        for sea in seen {
+        for mut sea in seen {
+            sea.calm.clone_from(&self.calm);
             let _ = self.planner.observe_sea(sea.clone(), self.now);
             self.seas.push(sea);
         }

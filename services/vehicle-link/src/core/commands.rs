@@ -83,6 +83,9 @@ pub enum CommandError {
     /// The link went down before an answer.
     #[error("the link to the autopilot was lost before it answered")]
     LinkLost,
+    /// The motors were told to stop, whatever was under way with them.
+    #[error("overtaken by a termination")]
+    Overtaken,
     /// The pilot took over before it was answered.
     #[error("withdrawn, since the pilot took over")]
     Withdrawn,
@@ -109,6 +112,8 @@ struct Transaction {
     tries: u8,
     as_int: bool,
     percent: Option<u8>,
+    /// The next acknowledgement may be of what this overtook.
+    skips_ack: bool,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -126,6 +131,8 @@ enum Phase {
         result: &'static str,
     },
     Accepted,
+    /// By a termination.
+    Overtaken,
 }
 
 /// All transactions with one autopilot.
@@ -140,12 +147,34 @@ impl Commands {
     /// # Errors
     /// [`CommandError::Busy`] when too many are under way.
     pub fn submit(&mut self, ticket: Ticket, command: Command) -> Result<(), CommandError> {
-        if self.open.len() >= OPEN_MAX {
+        let terminates = command == Command::Disarm { force: true };
+        let skips_ack = terminates && self.overtake(command);
+        // A termination waits for no place.
+        if self.open.len() >= OPEN_MAX && !(terminates && self.open.len() < 2 * OPEN_MAX) {
             return Err(CommandError::Busy);
         }
-        let phase = Phase::Waiting;
-        self.open.push_back(Transaction { ticket, command, phase, started: None, tries: 0, as_int: false, percent: None });
+        self.open.push_back(Transaction {
+            ticket,
+            command,
+            phase: Phase::Waiting,
+            started: None,
+            tries: 0,
+            as_int: false,
+            percent: None,
+            skips_ack,
+        });
         Ok(())
+    }
+
+    /// Ends whatever else is under way under the same id. Returns whether its acknowledgement may still come.
+    fn overtake(&mut self, command: Command) -> bool {
+        let mut answer_due = false;
+        let others = self.open.iter_mut().filter(|open| open.command.id() == command.id() && open.command != command);
+        for open in others {
+            answer_due |= matches!(open.phase, Phase::Sent { .. } | Phase::InProgress { .. });
+            open.phase = Phase::Overtaken;
+        }
+        answer_due
     }
 
     /// Takes an acknowledgement from the autopilot. `own_system` and `own_component` are ours: one addressed to another client
@@ -161,6 +190,10 @@ impl Commands {
             open.command.id() == ack.command && matches!(open.phase, Phase::Sent { .. } | Phase::InProgress { .. })
         };
         let Some(open) = self.open.iter_mut().find(waiting) else { return };
+        // Skipped wrongly, it is answered again when it is sent again.
+        if std::mem::take(&mut open.skips_ack) && open.tries <= 1 {
+            return;
+        }
         open.phase = match ack.result {
             MavResult::MAV_RESULT_ACCEPTED => Phase::Accepted,
             MavResult::MAV_RESULT_IN_PROGRESS => {
@@ -201,7 +234,9 @@ impl Commands {
     pub fn withdraw(&mut self, to: Option<Address>, mode: Option<FlightMode>) -> Vec<Effect> {
         let mut ended = Vec::new();
         self.open.retain(|open| {
-            let keep = matches!(open.command, Command::SetInterval(_));
+            // A person's termination stands: whoever has the vehicle, its motors are to stop.
+            let terminates = open.ticket != 0 && open.command == Command::Disarm { force: true };
+            let keep = terminates || matches!(open.command, Command::SetInterval(_));
             if !keep {
                 ended.extend(to.and_then(|to| open.cancellation(to)).map(Effect::Send));
                 let reached = mode.is_some_and(|mode| open.command == Command::SetMode(mode));
@@ -241,6 +276,7 @@ impl Transaction {
     fn step(&mut self, to: Address, texts: &Texts, now: Stamp, effects: &mut Vec<Effect>) -> bool {
         let outcome = match self.phase {
             Phase::Accepted => Ok(()),
+            Phase::Overtaken => Err(CommandError::Overtaken),
             Phase::Refused { until, .. } if now < until => return true,
             Phase::Refused { result, .. } => Err(CommandError::Refused { result, words: self.explanation(texts, now) }),
             _ if self.started.is_some_and(|started| now.seconds_since(started) > PROGRESS_S_MAX) => {
@@ -404,6 +440,40 @@ mod tests {
         assert!(commands.poll(to(), &Texts::default(), t(0.2)).is_empty());
         commands.observe_ack(&ack(arm, MavResult::MAV_RESULT_ACCEPTED, OWN), OWN.0, OWN.1, t(0.3));
         assert!(matches!(commands.poll(to(), &Texts::default(), t(0.3))[..], [Effect::Done(1, Command::Arm, Ok(()))]));
+    }
+
+    #[test]
+    fn a_termination_goes_out_at_once_and_another_commands_answer_is_not_taken_for_its_own() {
+        let mut commands = Commands::default();
+        for ticket in 1..=OPEN_MAX as u64 {
+            let command = if ticket % 2 == 0 { Command::Arm } else { Command::Disarm { force: false } };
+            commands.submit(ticket, command).unwrap();
+        }
+        commands.poll(to(), &Texts::default(), t(0.0));
+        assert_eq!(commands.submit(98, Command::Arm), Err(CommandError::Busy));
+        commands.submit(99, Command::Disarm { force: true }).unwrap();
+        let effects = commands.poll(to(), &Texts::default(), t(0.1));
+        let overtaken = |effect: &&Effect| matches!(effect, Effect::Done(_, _, Err(CommandError::Overtaken)));
+        assert_eq!(effects.iter().filter(overtaken).count(), OPEN_MAX);
+        let stop = |effects: &[Effect]| {
+            let is_stop =
+                |effect: &&Effect| matches!(effect, Effect::Send(MavMessage::COMMAND_LONG(data)) if data.param2 == 21196.0);
+            effects.iter().filter(is_stop).count()
+        };
+        assert_eq!(stop(&effects), 1);
+        // The first one's answer comes now; the termination itself was lost, and is sent again.
+        let accepted = ack(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, MavResult::MAV_RESULT_ACCEPTED, OWN);
+        commands.observe_ack(&accepted, OWN.0, OWN.1, t(0.2));
+        let effects = commands.poll(to(), &Texts::default(), t(1.2));
+        assert_eq!(stop(&effects), 1);
+        // Not even the pilot's mode change withdraws it, if a person asked.
+        assert!(commands.withdraw(None).is_empty());
+        commands.observe_ack(&accepted, OWN.0, OWN.1, t(1.3));
+        let effects = commands.poll(to(), &Texts::default(), t(1.3));
+        assert!(matches!(effects[..], [Effect::Done(99, Command::Disarm { force: true }, Ok(()))]), "{effects:?}");
+        // Our own is.
+        commands.submit(0, Command::Disarm { force: true }).unwrap();
+        assert_eq!(commands.withdraw(None).len(), 1);
     }
 
     #[test]

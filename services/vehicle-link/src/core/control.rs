@@ -25,6 +25,8 @@ pub struct Control {
     ours: Option<FlightMode>,
     hands_off: bool,
     since_start: bool,
+    /// The autopilot started again: GUIDED must be *set*, that it is GUIDED hands nothing back.
+    restarted: bool,
 }
 
 impl Control {
@@ -44,6 +46,16 @@ impl Control {
     #[must_use]
     pub fn may_adopt(&self) -> bool {
         self.hands_off && self.since_start
+    }
+
+    /// The autopilot started again in flight: whatever mode it comes up in, nobody asked for it now. Hands off until GUIDED is set.
+    pub fn autopilot_restarted(&mut self) {
+        *self = Self { last: self.last, hands_off: true, restarted: true, ..Self::default() };
+    }
+
+    /// Our clock went back.
+    pub fn clock_went_back(&mut self, by_s: f64) {
+        self.expected = self.expected.map(|(mode, at)| (mode, at.plus_secs_f64(-by_s)));
     }
 
     /// Takes the present mode as our own.
@@ -67,9 +79,13 @@ impl Control {
             self.ours = Some(mode);
             self.expected = None;
             self.hands_off = false;
-        } else if mode == FlightMode::Guided {
+            self.restarted = false;
+        } else if mode == FlightMode::Guided && (changed || !self.restarted) {
             // Whoever set it: this is how the vehicle is handed back.
             self.hands_off = false;
+            self.restarted = false;
+        } else if self.restarted && armed {
+            self.hands_off = true;
         } else if changed {
             // On the ground too, once we had set a mode: setting it again would be a fight.
             self.hands_off = armed || self.ours.is_some();
@@ -81,6 +97,7 @@ impl Control {
         } else if disarmed {
             // The flight is over; so is whoever's turn it was.
             self.hands_off = false;
+            self.restarted = false;
             self.ours = None;
         }
         if changed && !first {
@@ -166,6 +183,28 @@ mod tests {
         control.expect(Guided, t(1.0));
         assert_eq!(control.observe(Stabilize, true, t(2.0)), Change::TakenOver);
         assert!(control.hands_off());
+    }
+
+    #[test]
+    fn after_the_autopilots_restart_guided_must_be_set_not_just_be() {
+        let flying = || {
+            let mut control = Control::default();
+            control.observe(Guided, true, t(0.0));
+            control.autopilot_restarted();
+            assert_eq!(control.observe(Guided, true, t(0.2)), Change::None);
+            assert!(control.hands_off() && !control.may_adopt());
+            control
+        };
+        let mut control = flying();
+        control.observe(Loiter, true, t(1.0));
+        assert!(control.hands_off());
+        assert_eq!(control.observe(Guided, true, t(2.0)), Change::HandedBack);
+        // A person's own SetMode(GUIDED), already in GUIDED.
+        let mut control = flying();
+        control.expect(Guided, t(1.0));
+        assert_eq!(control.observe(Guided, true, t(1.2)), Change::HandedBack);
+        let mut control = flying();
+        assert_eq!(control.observe(Guided, false, t(1.0)), Change::HandedBack, "down and off");
     }
 
     #[test]

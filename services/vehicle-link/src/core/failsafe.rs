@@ -1,21 +1,36 @@
-//! The fail-safes that watch over every flight.
+//! The fail-safes that watch over every flight. Each row names its test, in `tests/failsafes.rs` or `tests/mishaps.rs`.
 //!
-//! | what happens | what it does | until |
-//! |---|---|---|
-//! | autopilot silent | sends nothing; the autopilot hovers by itself | it is heard |
-//! | pilot, or the autopilot's own fail-safe, changes the mode | hands off, commands under way withdrawn | GUIDED is set again |
-//! | estimator or GNSS bad | stops; then asks for LAND | it is good again, before LAND |
-//! | battery under the land fraction | LAND where it is | disarmed |
-//! | outside the fence | returns | inside, and a new task |
-//! | battery under the return fraction, or unknown too long | returns | disarmed |
-//! | plan lapsed (planner, bus or mesh lost) | holds, then returns; a descent stops and climbs | a newer plan |
-//! | leader silent, not flying, or in another mode | holds, then returns | it may be followed again |
-//! | clearance lapsed in a descent | stops, climbs to the approach height, waits, then returns | a new clearance |
+//! | what happens | what it does | until | test |
+//! |---|---|---|---|
+//! | autopilot silent | sends nothing; the autopilot hovers by itself | it is heard | `a_silent_autopilot_is_sent_nothing_and_taken_up_again` |
+//! | autopilot starts again in flight | hands off, everything under way withdrawn, streams asked for again | GUIDED is set | `an_autopilot_that_starts_again_in_flight_is_left_alone_until_guided_is_set` |
+//! | pilot changes the mode | hands off, commands under way withdrawn | GUIDED is set again | `the_pilot_is_never_fought_and_hands_back_with_guided` |
+//! | the autopilot's own fail-safe changes it | the same | the same | `the_autopilots_own_fail_safe_is_not_fought_either_and_is_named` |
+//! | estimator or GNSS bad | stops; then asks for LAND | it is good again, before LAND | `a_bad_estimator_stops_then_lands` |
+//! | battery under the land fraction | LAND where it is | disarmed | `battery_low_returns_and_stays_returning_battery_empty_lands_here` |
+//! | own position jumps | stops on velocity, no setpoint goes after it; then asks for LAND if it jumps on | it has settled and the estimator is good | `a_position_that_jumps_is_not_flown_after_and_is_believed_once_settled` |
+//! | outside the fence | returns | inside, and a new task | `outside_the_fence_it_returns_and_a_task_outside_is_refused` |
+//! | battery under the return fraction | returns | disarmed | `battery_low_returns_and_stays_returning_battery_empty_lands_here` |
+//! | battery just enough for the way home | returns | disarmed | `a_battery_that_just_suffices_for_the_way_home_sends_it_there` |
+//! | battery unknown too long | returns | disarmed | `battery_unknown_for_long_returns` |
+//! | plan lapsed (planner, bus or mesh lost) | holds, then returns; a descent stops and climbs | a newer plan | `a_lapsed_plan_holds_then_returns_and_a_newer_one_is_taken_up_again` |
+//! | leader silent | predicted for 1 s, held for until 5 s, then returns | it is heard | `a_silent_leader_is_predicted_then_waited_for_then_given_up` |
+//! | leader in another mode, or not flying | holds, then returns | it may be followed again | `a_leader_that_leaves_the_allowed_modes_ends_the_following` |
+//! | leader's position jumps | holds; both places are kept clear | it has settled | `a_leader_that_jumps_is_not_followed_and_both_places_are_kept_clear` |
+//! | clearance lapsed or withdrawn in a descent | stops, climbs to the approach height, waits, then returns | a new clearance | `a_withdrawn_clearance_stops_the_descent_climbs_waits_and_returns` |
+//! | our clock set back, or stood still | everything dated goes back with it: nothing lasts longer | | `a_clock_that_goes_back_lengthens_nothing` |
+//! | our clock set forward | plans and clearances lapse; nothing else is rushed | a newer plan | `a_clock_that_goes_forward_lapses_permissions_and_rushes_nothing` |
+//! | home moves in flight | said, and flown to where it took off | | `a_home_that_moves_in_flight_is_not_flown_to` |
+//! | another vehicle with the same name | said; no take-off | it is silent | `another_vehicle_with_the_same_name_is_told_and_not_taken_off_beside` |
+//! | rangefinder and autopilot's height disagree in a descent | said, and the safer counts | they agree | `a_rangefinder_that_disagrees_makes_it_careful` |
+//! | afloat in LAND with motors on | asks to stop them; at the surface by two witnesses and refused, stops them | | `afloat_on_waves_the_motors_stop_though_the_autopilot_finds_no_end` |
 //!
-//! The first two and the last are in [`super::executor`], beside what they interrupt; the others are decided here, the weightiest first.
+//! What a landing needs is in [`super::executor`], beside what it interrupts; the others are decided here, the weightiest first.
+//! A pilot, or an autopilot's own fail-safe, is above them all ([`super::control`]).
 
 use halcyon_model::{Stamp, VehicleState};
 
+use super::energy::Consumption;
 use super::interlock::FollowRefusal;
 use super::limits::FailSafeLimits;
 
@@ -28,6 +43,7 @@ const FENCE_MARGIN_M: f64 = 5.0;
 pub enum Cause {
     Estimator,
     BatteryLand,
+    Jump,
     Fence,
     BatteryReturn,
     StalePlan,
@@ -77,18 +93,41 @@ pub struct Conditions<'a> {
     pub follow: Option<Result<(), FollowRefusal>>,
     /// Whether it is on its way home already.
     pub homeward: bool,
+    /// Its position jumped and hasn't settled: by how much, metres.
+    pub jumped_m: Option<f64>,
+    /// How long the way home would take in still air, landing included, seconds; `None` if home is unknown.
+    pub home_s: Option<f64>,
 }
+
+/// For how long something has been so, seconds, as far as it was watched: a clock that leaps makes nothing last longer.
+#[derive(Debug, Clone, Copy, Default)]
+struct Lasting(Option<f64>);
+
+impl Lasting {
+    fn step(&mut self, is_so: bool, dt_s: f64) -> Option<f64> {
+        self.0 = is_so.then(|| self.0.map_or(0.0, |for_s| for_s + dt_s));
+        self.0
+    }
+}
+
+/// Two steps are taken to be no further apart than this, seconds.
+const STEP_S_MAX: f64 = 1.5;
 
 /// Watches one flight.
 #[derive(Debug, Clone, Default)]
 pub struct FailSafes {
-    estimator_bad: Option<Stamp>,
-    battery_unknown: Option<Stamp>,
-    battery_low: bool,
+    stepped: Option<Stamp>,
+    estimator_bad: Lasting,
+    battery_unknown: Lasting,
+    battery_short: Lasting,
+    battery_out: Lasting,
+    consumption: Consumption,
+    battery_low: Option<String>,
     battery_empty: bool,
+    jumped: Lasting,
     outside: bool,
-    plan_lapsed: Option<Stamp>,
-    leader_lost: Option<Stamp>,
+    plan_lapsed: Lasting,
+    leader_lost: Lasting,
 }
 
 impl FailSafes {
@@ -97,27 +136,54 @@ impl FailSafes {
         self.outside = false;
     }
 
+    /// The charge that the way home needs, reserve included, as a fraction.
+    fn fraction_home(&self, home_s: f64, limits: &FailSafeLimits) -> f64 {
+        let rate_hz = self.consumption.rate_hz(limits.battery_endurance_s);
+        limits.battery_land_fraction + rate_hz * home_s * limits.battery_home_factor
+    }
+
+    /// Looks at the battery. A reading that isn't a number is none; one that is low counts once it has been so for a while.
+    fn watch_battery(&mut self, conditions: &Conditions, limits: &FailSafeLimits, dt_s: f64) {
+        let fraction = conditions.own.battery_fraction.filter(|fraction| fraction.is_finite());
+        self.consumption.observe(fraction, dt_s);
+        let unknown_s = self.battery_unknown.step(fraction.is_none(), dt_s);
+        if unknown_s.is_some_and(|unknown_s| unknown_s >= limits.battery_unknown_s) {
+            self.battery_low.get_or_insert_with(|| "battery unknown: returning".into());
+        }
+        // Unknown for a moment, a low battery is not full again.
+        let Some(fraction) = fraction else { return };
+        let percent = 100.0 * fraction;
+        let for_home = conditions.home_s.map(|home_s| self.fraction_home(home_s, limits));
+        let short = fraction <= limits.battery_return_fraction || for_home.is_some_and(|needed| fraction <= needed);
+        let counts = |for_s: Option<f64>| for_s.is_some_and(|for_s| for_s >= limits.battery_low_s);
+        self.battery_empty |= counts(self.battery_out.step(fraction <= limits.battery_land_fraction, dt_s));
+        if counts(self.battery_short.step(short, dt_s)) {
+            let reason = match for_home {
+                Some(needed) if fraction > limits.battery_return_fraction => {
+                    format!("battery {percent:.0} %, and {:.0} % needed for the way home: returning", 100.0 * needed)
+                }
+                _ => format!("battery {percent:.0} %: returning"),
+            };
+            self.battery_low.get_or_insert(reason);
+        }
+    }
+
     /// The alarm in charge at `now`, if any. Call at every step in flight.
     pub fn step(&mut self, conditions: &Conditions, limits: &FailSafeLimits, now: Stamp) -> Option<Alarm> {
         let own = conditions.own;
-        let since = |start: &mut Option<Stamp>, bad: bool| -> Option<f64> {
-            *start = bad.then(|| start.unwrap_or(now));
-            start.map(|start| now.seconds_since(start))
-        };
-        let estimator_s = since(&mut self.estimator_bad, !own.estimator_ok);
-        let unknown_s = since(&mut self.battery_unknown, own.battery_fraction.is_none());
-        let lapsed_s = since(&mut self.plan_lapsed, conditions.plan == PlanHealth::Lapsed);
+        let dt_s = self.stepped.map_or(0.0, |stepped| now.seconds_since(stepped)).clamp(0.0, STEP_S_MAX);
+        self.stepped = Some(now);
+        let estimator_s = self.estimator_bad.step(!own.estimator_ok, dt_s);
+        let lapsed_s = self.plan_lapsed.step(conditions.plan == PlanHealth::Lapsed, dt_s);
         let refused = conditions.follow.as_ref().and_then(|follow| follow.as_ref().err());
-        let leader_s = since(&mut self.leader_lost, refused.is_some());
-        if let Some(fraction) = own.battery_fraction {
-            self.battery_empty |= fraction <= limits.battery_land_fraction;
-            self.battery_low |= fraction <= limits.battery_return_fraction;
-        }
-        self.battery_low |= unknown_s.is_some_and(|unknown_s| unknown_s >= limits.battery_unknown_s);
+        let leader_s = self.leader_lost.step(refused.is_some(), dt_s);
+        let jumped_s = self.jumped.step(conditions.jumped_m.is_some(), dt_s);
+        self.watch_battery(conditions, limits, dt_s);
         let distance_m = own.position_ned_m.xy().norm();
         let height_m = -own.position_ned_m.z;
         // Where a bad estimator believes itself to be says nothing.
         self.outside |= own.estimator_ok
+            && conditions.jumped_m.is_none()
             && (distance_m > limits.fence_radius_m + FENCE_MARGIN_M || height_m > limits.fence_height_m + FENCE_MARGIN_M);
 
         let alarm = |cause, action, reason: String| Some(Alarm { cause, action, reason });
@@ -128,16 +194,20 @@ impl FailSafes {
             let action = if land { Action::Land } else { Action::Hold };
             return alarm(Cause::Estimator, action, format!("position not good enough to fly by ({fix})"));
         }
-        let percent = own.battery_fraction.map_or("unknown".to_owned(), |fraction| format!("{:.0} %", 100.0 * fraction));
         if self.battery_empty {
+            let percent = own.battery_fraction.map_or("unknown".to_owned(), |fraction| format!("{:.0} %", 100.0 * fraction));
             return alarm(Cause::BatteryLand, Action::Land, format!("battery {percent}: landing here"));
+        }
+        if let (Some(by_m), Some(jumped_s)) = (conditions.jumped_m, jumped_s) {
+            let action = if jumped_s >= limits.jump_land_s { Action::Land } else { Action::Hold };
+            return alarm(Cause::Jump, action, format!("own position jumped by {by_m:.0} m"));
         }
         if self.outside {
             let reason = format!("outside the fence ({distance_m:.0} m out, {height_m:.0} m up)");
             return alarm(Cause::Fence, Action::Return, reason);
         }
-        if self.battery_low {
-            return alarm(Cause::BatteryReturn, Action::Return, format!("battery {percent}: returning"));
+        if let Some(reason) = &self.battery_low {
+            return alarm(Cause::BatteryReturn, Action::Return, reason.clone());
         }
         if conditions.homeward {
             // Already doing what the rest would have it do.
@@ -147,7 +217,12 @@ impl FailSafes {
             return alarm(Cause::StalePlan, hold_then_return(lapsed_s), "no valid plan".into());
         }
         if let (Some(leader_s), Some(refused)) = (leader_s, refused) {
-            return alarm(Cause::Leader, hold_then_return(leader_s), refused.to_string());
+            let action = match refused {
+                // It was waited for already, predicted and then held for, while it was followed. Never heard, it may yet come.
+                FollowRefusal::Silent { silent_s, .. } if silent_s.is_finite() => Action::Return,
+                _ => hold_then_return(leader_s),
+            };
+            return alarm(Cause::Leader, action, refused.to_string());
         }
         None
     }

@@ -17,6 +17,12 @@ pub enum FollowRefusal {
         /// For how long; infinite if never.
         silent_s: f64,
     },
+    /// Its position has just jumped: nobody knows where it is.
+    #[error("leader {leader}'s position jumped")]
+    Jumped {
+        /// Whom.
+        leader: VehicleId,
+    },
     /// In a mode that isn't in the list.
     #[error("leader {leader} is in {mode}, which is not one of {allowed}")]
     Mode {

@@ -47,6 +47,10 @@ pub struct Limits {
     pub land_mode_height_m: f64,
     /// Height below which a landing is no longer broken off, metres.
     pub commit_height_m: f64,
+    /// Height above the landing place at which a vehicle waits for a calm window, where one is offered, metres.
+    pub calm_height_m: f64,
+    /// For so long at most, seconds: then it goes on, since the clearance alone permits the landing.
+    pub calm_wait_s: f64,
     /// Time by which the follower aims ahead of the leader's present, seconds. The age of the leader's state is made up for
     /// already; this is for a lag of the follower's own autopilot. On the simulated ArduCopter 0 is best.
     pub latency_s: f64,
@@ -76,6 +80,8 @@ impl Default for Limits {
             landing_radius_m: 1.0,
             land_mode_height_m: 1.0,
             commit_height_m: 0.5,
+            calm_height_m: 2.0,
+            calm_wait_s: 20.0,
             latency_s: 0.0,
             leader_modes: vec!["LOITER".into(), "GUIDED".into()],
         }
@@ -103,9 +109,14 @@ impl Limits {
             ("landing_radius_m", self.landing_radius_m),
             ("land_mode_height_m", self.land_mode_height_m),
             ("commit_height_m", self.commit_height_m),
+            ("calm_height_m", self.calm_height_m),
         ];
         check_each(&positive, "limits", |value| value > 0.0, "above 0")?;
-        let not_negative = [("separation_margin_m", self.separation_margin_m), ("latency_s", self.latency_s)];
+        let not_negative = [
+            ("separation_margin_m", self.separation_margin_m),
+            ("latency_s", self.latency_s),
+            ("calm_wait_s", self.calm_wait_s),
+        ];
         check_each(&[("slot_slack_m", self.slot_slack_m)], "limits", |value| (0.0..=2.0).contains(&value), "in 0 to 2")?;
         check_each(&not_negative, "limits", |value| value >= 0.0, "0 or more")?;
         check_each(&[("separation_m_min", self.separation_m_min)], "limits", |value| value >= 5.0, "at least 5")?;
@@ -121,6 +132,12 @@ impl Limits {
             "limits",
             |value| value >= self.commit_height_m && value < self.safe_height_m,
             "between commit_height_m and safe_height_m",
+        )?;
+        check_each(
+            &[("calm_height_m", self.calm_height_m)],
+            "limits",
+            |value| value >= self.land_mode_height_m && value < self.safe_height_m,
+            "between land_mode_height_m and safe_height_m",
         )?;
         for name in &self.leader_modes {
             if FlightMode::from_name(name).is_none() {
@@ -155,15 +172,30 @@ pub struct FailSafeLimits {
     pub battery_take_off_fraction: f64,
     /// Battery unknown in flight for so long: return, seconds.
     pub battery_unknown_s: f64,
+    /// A charge that is too low must be so for this long before it counts: a sag under load is none, seconds.
+    pub battery_low_s: f64,
+    /// From full to empty in flight, seconds, until the flight itself has told how fast the battery empties.
+    pub battery_endurance_s: f64,
+    /// What the way home is reckoned to take more than in still air.
+    pub battery_home_factor: f64,
+    /// A position that moves by so much more than speed, acceleration and the receiver's stated accuracy allow has jumped, metres.
+    pub jump_m: f64,
+    /// After a jump: hold for so long without another before the new position is flown by, seconds.
+    pub jump_settle_s: f64,
+    /// Jumping on for so long: ask the autopilot to LAND, seconds.
+    pub jump_land_s: f64,
+    /// In LAND, at the surface by height and by rangefinder for so long: ask to stop the motors, seconds. For twice as long, and
+    /// refused because the autopilot finds no end of a landing on waves: stop them.
+    pub afloat_s: f64,
     /// Fence: horizontal distance from the fleet's origin, metres.
     pub fence_radius_m: f64,
     /// Fence: height above mean water, metres.
     pub fence_height_m: f64,
     /// A leader silent for so long is no longer predicted: the follower stops, seconds.
     pub leader_predict_s: f64,
-    /// A leader silent for so long is lost: following ends, seconds (thesis §6.7.4.4: 5 s).
+    /// A leader silent for so long is lost: the follower returns, seconds (thesis §6.7.4.4: 5 s).
     pub leader_silent_s: f64,
-    /// After a lost leader or a lapsed plan: hold for so long, then return, seconds.
+    /// After a lapsed plan, or a leader that may not be followed: hold for so long, then return, seconds.
     pub hold_s: f64,
     /// Over the landing place without a clearance for so long: return, seconds.
     pub clearance_wait_s: f64,
@@ -182,6 +214,13 @@ impl Default for FailSafeLimits {
             battery_land_fraction: 0.10,
             battery_take_off_fraction: 0.35,
             battery_unknown_s: 15.0,
+            battery_low_s: 3.0,
+            battery_endurance_s: 1200.0,
+            battery_home_factor: 1.5,
+            jump_m: 3.0,
+            jump_settle_s: 5.0,
+            jump_land_s: 30.0,
+            afloat_s: 10.0,
             fence_radius_m: 500.0,
             fence_height_m: 60.0,
             leader_predict_s: 1.0,
@@ -204,6 +243,12 @@ impl FailSafeLimits {
             ("estimator_bad_s", self.estimator_bad_s),
             ("estimator_land_s", self.estimator_land_s),
             ("battery_unknown_s", self.battery_unknown_s),
+            ("battery_low_s", self.battery_low_s),
+            ("battery_endurance_s", self.battery_endurance_s),
+            ("jump_m", self.jump_m),
+            ("jump_settle_s", self.jump_settle_s),
+            ("jump_land_s", self.jump_land_s),
+            ("afloat_s", self.afloat_s),
             ("fence_radius_m", self.fence_radius_m),
             ("fence_height_m", self.fence_height_m),
             ("leader_predict_s", self.leader_predict_s),
@@ -218,6 +263,7 @@ impl FailSafeLimits {
                 "fail_safe: battery fractions must be 0 <= land <= return <= take off <= 1, not {land}, {back}, {off}"
             ));
         }
+        check_each(&[("battery_home_factor", self.battery_home_factor)], "fail_safe", |value| value >= 1.0, "at least 1")?;
         let ordered = |value: f64| value >= self.leader_predict_s;
         check_each(&[("leader_silent_s", self.leader_silent_s)], "fail_safe", ordered, "at least leader_predict_s")
     }

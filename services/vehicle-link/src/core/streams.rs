@@ -22,7 +22,7 @@ const fn stream(message_id: u32, interval_us: u32, stall_s: f64) -> Stream {
 }
 
 /// What is asked for. Heartbeats come faster than the usual 1 Hz, since they tell that the pilot took over.
-pub const STREAMS: [Stream; 10] = [
+pub const STREAMS: [Stream; 11] = [
     stream(ardu::GLOBAL_POSITION_INT_DATA::ID, 100_000, 2.0),
     stream(ardu::ATTITUDE_QUATERNION_DATA::ID, 100_000, 2.0),
     // Where its local frame lies: setpoints with acceleration are taken only there.
@@ -34,6 +34,8 @@ pub const STREAMS: [Stream; 10] = [
     stream(ardu::GPS_RAW_INT_DATA::ID, 500_000, 4.0),
     stream(ardu::BATTERY_STATUS_DATA::ID, 1_000_000, 8.0),
     stream(ardu::HOME_POSITION_DATA::ID, 1_000_000, 8.0),
+    // Where there is a rangefinder.
+    stream(ardu::DISTANCE_SENSOR_DATA::ID, 100_000, 8.0),
 ];
 
 /// Asking for one stream again waits at least this long, growing to [`RETRY_S_MAX`] for what the autopilot doesn't have.

@@ -4,19 +4,36 @@
 //! Height above mean water is the autopilot's altitude relative to home plus home's known height above the water
 //! (`home_height_m`). The other choice, GNSS altitude above mean sea level less the origin's, is off by metres (GNSS is worse
 //! upwards than sideways, geoid models differ by decimetres, a lake isn't at sea level); the barometer and the estimator hold the
-//! relative one to decimetres over a flight, and a jetty's height is measured with a tape.
+//! relative one to decimetres over a flight, and a jetty's height is measured with a tape. The home that counts is the one it took
+//! off from: an autopilot whose home is set anew in flight counts its height from there, and that is made up for.
+//!
+//! # Ages
+//! Every part says how old it is. Health that is old, or dated ahead of now by a clock that was set back, is unknown.
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use halcyon_model::{
-    Activity, Fix, FleetOrigin, FlightMode, Geodetic, LandedState, LocalFrame, Role, Stamp, VehicleId, VehicleState,
+    Activity, Ages, Fix, FleetOrigin, FlightMode, Geodetic, LandedState, LocalFrame, Range, Role, Stamp, VehicleId,
+    VehicleState,
 };
 use mavlink::dialects::ardupilotmega as ardu;
 use mavlink::dialects::ardupilotmega::{EkfStatusFlags as Ekf, EstimatorStatusFlags as Estimator, MavMessage};
 
+use super::motion::Differentiator;
+
 /// After so long without news, a health value is unknown again, seconds.
 const HEALTH_AGE_S: f64 = 5.0;
 const BATTERY_AGE_S: f64 = 10.0;
+/// A range is of one moment over moving water, seconds.
+const RANGE_AGE_S: f64 = 0.5;
+/// DISTANCE_SENSOR says more than ArduPilot's RANGEFINDER, which counts only where the other is not heard for so long, seconds.
+const DISTANCE_SENSOR_S: f64 = 2.0;
+/// DISTANCE_SENSOR's word for a signal that is not valid; 0 is its word for not known.
+const SIGNAL_INVALID: u8 = 1;
+/// What is dated further ahead of now than this is not fresh, seconds.
+const AHEAD_S: f64 = 0.5;
+/// Home whose height changes in flight by more than this was set anew, metres; less is its own wander after arming.
+const HOME_MOVED_M: f64 = 2.0;
 /// The boot clock's offset to the fleet's is the least delay seen in the last one to two of these, seconds.
 const OFFSET_WINDOW_S: f64 = 10.0;
 
@@ -26,7 +43,11 @@ struct Aged<T>(T, Stamp);
 
 impl<T: Copy> Aged<T> {
     fn fresh(this: Option<Self>, now: Stamp, age_s: f64) -> Option<T> {
-        this.filter(|aged| now.seconds_since(aged.1) <= age_s).map(|aged| aged.0)
+        this.filter(|aged| (-AHEAD_S..=age_s).contains(&now.seconds_since(aged.1))).map(|aged| aged.0)
+    }
+
+    fn age_s(this: Option<Self>, now: Stamp) -> Option<f64> {
+        this.map(|aged| now.seconds_since(aged.1).max(0.0))
     }
 }
 
@@ -48,8 +69,14 @@ pub struct Telemetry {
     boot: BootClock,
     heartbeat: Option<Aged<(FlightMode, bool)>>,
     position: Option<Position>,
-    attitude: Option<UnitQuaternion<f64>>,
-    home: Option<Geodetic>,
+    attitude: Option<Aged<UnitQuaternion<f64>>>,
+    home: Option<Aged<Geodetic>>,
+    /// Home when it left the ground.
+    home_of_flight: Option<Geodetic>,
+    motion: Differentiator,
+    /// `None` within: out of its range.
+    range: Option<Aged<Option<f64>>>,
+    distance_sensor_heard: Option<Stamp>,
     landed: Option<Aged<LandedState>>,
     battery: Option<Aged<(Option<f64>, Option<f64>)>>,
     fix: Option<Aged<Fix>>,
@@ -72,6 +99,10 @@ impl Telemetry {
             position: None,
             attitude: None,
             home: None,
+            home_of_flight: None,
+            motion: Differentiator::default(),
+            range: None,
+            distance_sensor_heard: None,
             landed: None,
             battery: None,
             fix: None,
@@ -101,19 +132,38 @@ impl Telemetry {
                 let quaternion = Quaternion::new(q[0], q[1], q[2], q[3]);
                 // A quaternion far from unit length is no attitude.
                 if (quaternion.norm() - 1.0).abs() < 0.1 {
-                    self.attitude = Some(UnitQuaternion::from_quaternion(quaternion));
+                    self.attitude = Some(Aged(UnitQuaternion::from_quaternion(quaternion), now));
                 }
                 return true;
             }
             MavMessage::ATTITUDE(data) => {
                 let [roll, pitch, yaw] = [data.roll, data.pitch, data.yaw].map(f64::from);
                 if [roll, pitch, yaw].iter().all(|angle| angle.is_finite()) {
-                    self.attitude = Some(UnitQuaternion::from_euler_angles(roll, pitch, yaw));
+                    self.attitude = Some(Aged(UnitQuaternion::from_euler_angles(roll, pitch, yaw), now));
                 }
                 return true;
             }
             MavMessage::HOME_POSITION(data) => {
-                self.home = geodetic(data.latitude, data.longitude, data.altitude);
+                self.home = geodetic(data.latitude, data.longitude, data.altitude).map(|home| Aged(home, now));
+                if self.home_of_flight.is_none() || !self.off_the_ground() {
+                    self.home_of_flight = self.home.map(|home| home.0);
+                }
+            }
+            MavMessage::LOCAL_POSITION_NED(data) => self.motion.observe(data, now),
+            MavMessage::DISTANCE_SENSOR(data)
+                if data.orientation == ardu::MavSensorOrientation::MAV_SENSOR_ROTATION_PITCH_270 =>
+            {
+                self.distance_sensor_heard = Some(now);
+                let inside = data.current_distance >= data.min_distance && data.current_distance < data.max_distance;
+                let valid = inside && data.current_distance > 0 && data.signal_quality != SIGNAL_INVALID;
+                self.range = Some(Aged(valid.then(|| f64::from(data.current_distance) * 1e-2), now));
+            }
+            MavMessage::RANGEFINDER(data)
+                if self.distance_sensor_heard.is_none_or(|heard| now.seconds_since(heard) > DISTANCE_SENSOR_S) =>
+            {
+                // It knows no limits of its own; nothing is nearer than 0, and that is its word for no reading.
+                let distance_m = f64::from(data.distance);
+                self.range = Some(Aged((distance_m > 0.0 && distance_m.is_finite()).then_some(distance_m), now));
             }
             MavMessage::EXTENDED_SYS_STATE(data) => self.landed = Some(Aged(landed(data.landed_state), now)),
             MavMessage::SYS_STATUS(data) => self.observe_sys_status(data, now),
@@ -188,6 +238,18 @@ impl Telemetry {
         }
     }
 
+    /// Known to be in the air: only then does a new home change nothing.
+    fn off_the_ground(&self) -> bool {
+        let armed = self.heartbeat.is_some_and(|heartbeat| heartbeat.0.1);
+        armed && self.landed.is_some_and(|landed| matches!(landed.0, LandedState::InAir | LandedState::Landing))
+    }
+
+    /// What the autopilot's relative altitude lacks because its home was set anew in flight, metres.
+    fn home_rise_m(&self) -> f64 {
+        let rise_m = self.home.zip(self.home_of_flight).map_or(0.0, |(home, flight)| home.0.altitude_m - flight.altitude_m);
+        if self.off_the_ground() && rise_m.abs() > HOME_MOVED_M { rise_m } else { 0.0 }
+    }
+
     /// When the autopilot was last heard.
     #[must_use]
     pub fn heard(&self) -> Option<Stamp> {
@@ -221,9 +283,9 @@ impl Telemetry {
     /// executor's to fill in.
     #[must_use]
     pub fn state(&self, now: Stamp) -> Option<VehicleState> {
-        let (position, attitude) = (self.position?, self.attitude?);
+        let (position, attitude) = (self.position?, self.attitude?.0);
         let (mode, armed) = self.heartbeat?.0;
-        let height_m = position.relative_altitude_m + self.home_height_m;
+        let height_m = position.relative_altitude_m + self.home_height_m + self.home_rise_m();
         // North and east from the map, down from the height above water: see the module's documentation.
         let at_height = Geodetic { altitude_m: self.frame.origin().altitude_m + height_m, ..position.geodetic };
         let mut position_ned_m = self.frame.ned_from_geodetic(at_height);
@@ -241,7 +303,7 @@ impl Telemetry {
             velocity_ned_mps: position.velocity_ned_mps,
             ned_from_body: attitude,
             heading_rad: attitude.euler_angles().2.rem_euclid(std::f64::consts::TAU),
-            home: self.home,
+            home: self.home.map(|home| home.0),
             mode,
             armed,
             landed: Aged::fresh(self.landed, now, HEALTH_AGE_S).unwrap_or(LandedState::Unknown),
@@ -254,10 +316,21 @@ impl Telemetry {
             activity: Activity::Idle,
             plan_generation: 0,
             touchdown: None,
-            acceleration_ned_mps2: None,
+            acceleration_ned_mps2: self.motion.ned_mps2(now),
             intent: None,
-            range: None,
-            ages: halcyon_model::Ages::default(),
+            range: Aged::fresh(self.range, now, RANGE_AGE_S)
+                .flatten()
+                .zip(self.range)
+                .map(|(distance_m, aged)| Range { stamp: aged.1, distance_m }),
+            ages: Ages {
+                mode_s: Aged::age_s(self.heartbeat, now),
+                attitude_s: Aged::age_s(self.attitude, now),
+                landed_s: Aged::age_s(self.landed, now),
+                battery_s: Aged::age_s(self.battery, now),
+                fix_s: Aged::age_s(self.fix, now),
+                estimator_s: Aged::age_s(self.estimator_ok, now),
+                home_s: Aged::age_s(self.home, now),
+            },
             link: None,
             firmware: None,
         })
@@ -413,6 +486,98 @@ mod tests {
         assert!(state.ready_to_arm);
         assert_eq!((state.battery_fraction, state.battery_v), (Some(0.73), Some(15.8)));
         assert_eq!(telemetry.state(t(13.0)).unwrap().battery_fraction, None);
+    }
+
+    #[test]
+    fn each_part_has_its_own_age_and_what_is_dated_ahead_is_unknown() {
+        let mut telemetry = telemetry(0.0);
+        basics(&mut telemetry, t(0.0));
+        let flags = EkfStatusFlags::from_bits_truncate(831);
+        let ekf = MavMessage::EKF_STATUS_REPORT(ardu::EKF_STATUS_REPORT_DATA { flags, ..Default::default() });
+        let gps = ardu::GPS_RAW_INT_DATA { fix_type: GpsFixType::GPS_FIX_TYPE_3D_FIX, ..Default::default() };
+        telemetry.observe(&ekf, t(2.0));
+        telemetry.observe(&MavMessage::GPS_RAW_INT(gps), t(2.5));
+        telemetry.observe(&MavMessage::ATTITUDE(ardu::ATTITUDE_DATA::default()), t(3.0));
+        let ages = telemetry.state(t(4.0)).unwrap().ages;
+        assert_eq!((ages.mode_s, ages.attitude_s), (Some(4.0), Some(1.0)));
+        assert_eq!((ages.estimator_s, ages.fix_s), (Some(2.0), Some(1.5)));
+        assert_eq!((ages.landed_s, ages.battery_s, ages.home_s), (None, None, None));
+        assert!(telemetry.state(t(4.0)).unwrap().estimator_ok);
+        assert!(!telemetry.state(t(-20.0)).unwrap().estimator_ok, "our clock was set back");
+    }
+
+    /// common.xml: orientation 25 is down, centimetres, quality 1 is an invalid signal and 0 none stated.
+    #[test]
+    fn a_range_is_downward_valid_and_of_just_now() {
+        let reading = |current_distance, orientation, signal_quality| {
+            MavMessage::DISTANCE_SENSOR(ardu::DISTANCE_SENSOR_DATA {
+                min_distance: 20,
+                max_distance: 700,
+                current_distance,
+                orientation,
+                signal_quality,
+                ..Default::default()
+            })
+        };
+        let down = ardu::MavSensorOrientation::MAV_SENSOR_ROTATION_PITCH_270;
+        assert_eq!(down as u32, 25);
+        let range_of = |message: &MavMessage| {
+            let mut telemetry = telemetry(0.0);
+            basics(&mut telemetry, t(0.0));
+            telemetry.observe(message, t(1.0));
+            let range = |s: f64| telemetry.state(t(s)).unwrap().range.map(|range| range.distance_m);
+            assert_eq!(range(2.0), None, "old");
+            range(1.2)
+        };
+        assert_eq!(range_of(&reading(150, down, 0)), Some(1.5));
+        assert_eq!(range_of(&reading(150, down, 80)), Some(1.5));
+        assert_eq!(range_of(&reading(150, down, 1)), None);
+        assert_eq!(range_of(&reading(10, down, 0)), None);
+        assert_eq!(range_of(&reading(700, down, 0)), None);
+        assert_eq!(range_of(&reading(150, ardu::MavSensorOrientation::MAV_SENSOR_ROTATION_NONE, 0)), None);
+        let finder = |distance| MavMessage::RANGEFINDER(ardu::RANGEFINDER_DATA { distance, voltage: 0.0 });
+        assert_eq!(range_of(&finder(2.5)), Some(2.5));
+        assert_eq!((range_of(&finder(0.0)), range_of(&finder(f32::NAN))), (None, None));
+        // The one that knows its limits has the word.
+        let mut telemetry = telemetry(0.0);
+        basics(&mut telemetry, t(0.0));
+        telemetry.observe(&reading(700, down, 0), t(1.0));
+        telemetry.observe(&finder(7.0), t(1.1));
+        assert_eq!(telemetry.state(t(1.2)).unwrap().range, None);
+    }
+
+    #[test]
+    fn a_home_set_anew_in_flight_does_not_move_the_height() {
+        let mut telemetry = telemetry(1.5);
+        basics(&mut telemetry, t(0.0));
+        let home = |altitude_m: f64| {
+            let data = ardu::HOME_POSITION_DATA {
+                latitude: 450_000_000,
+                longitude: 70_000_000,
+                altitude: (altitude_m * 1e3) as i32,
+                ..Default::default()
+            };
+            MavMessage::HOME_POSITION(data)
+        };
+        let landed =
+            |landed_state| MavMessage::EXTENDED_SYS_STATE(ardu::EXTENDED_SYS_STATE_DATA { landed_state, ..Default::default() });
+        telemetry.observe(&landed(ardu::MavLandedState::MAV_LANDED_STATE_ON_GROUND), t(0.0));
+        // On the ground it wanders with the receiver, and counts anew each time.
+        telemetry.observe(&home(231.0), t(0.0));
+        telemetry.observe(&home(226.0), t(0.1));
+        telemetry.observe(&landed(ardu::MavLandedState::MAV_LANDED_STATE_IN_AIR), t(0.2));
+        assert_eq!(telemetry.state(t(0.3)).unwrap().position_ned_m.z, -6.5);
+        // Set where it hovers, 5 m up: relative altitude 0.
+        telemetry.observe(&home(231.0), t(0.4));
+        let position = ardu::GLOBAL_POSITION_INT_DATA {
+            time_boot_ms: 50_400,
+            lat: 450_010_000,
+            lon: 70_000_000,
+            alt: 231_000,
+            ..Default::default()
+        };
+        telemetry.observe(&MavMessage::GLOBAL_POSITION_INT(position), t(0.4));
+        assert_eq!(telemetry.state(t(0.5)).unwrap().position_ned_m.z, -6.5);
     }
 
     /// Messages delayed by a queue are still dated when they were measured; a restarted autopilot starts the offset afresh.

@@ -238,6 +238,7 @@ impl Follower {
                     }
                 }
                 Output::Withdraw => drop(self.craft.link.withdraw()),
+                Output::AskStreams => self.craft.link.started_again(),
                 Output::Note(_) => {}
             }
         }

@@ -25,6 +25,7 @@ pub enum Decision {
 impl Executor {
     /// Decides about a command. The same command again is decided again, to the same effect.
     pub fn command(&mut self, command: &VehicleCommand, now: Stamp) -> Decision {
+        self.watch_clock(now);
         match self.decide(command, now) {
             Ok(decision) => {
                 self.note(Severity::Info, format!("command {}", name(&command.action)), format!("by {}", command.who));

@@ -7,7 +7,7 @@ use super::{Executor, Goal, Output};
 use crate::core::commands::Command;
 use crate::core::failsafe::{Action, Alarm, Cause, Conditions, PlanHealth};
 use crate::core::guidance::{PLACE_GAIN_HZ, Reference, SLOT_GAIN_HZ, Setpoint, Target, limit_velocity};
-use crate::core::interlock;
+use crate::core::interlock::{self, FollowRefusal};
 use crate::core::inverse::Inverse;
 use crate::core::separation;
 
@@ -84,6 +84,7 @@ impl Executor {
         if !self.flying.as_ref().is_some_and(|flying| flying.is_same_as(&effective)) {
             self.settle.reset();
             self.descending = false;
+            self.landing.start();
             self.held = None;
             self.left_slot();
             self.inverse = Inverse::default();
@@ -95,6 +96,9 @@ impl Executor {
         self.flying = Some(effective.clone());
         let mut step = Step { own, here_ned_m, dt_s, now, outputs };
         match own.mode {
+            FlightMode::Guided if alarm.as_ref().is_some_and(|alarm| alarm.cause == Cause::Jump && !land_now) => {
+                self.ride_out(&mut step);
+            }
             FlightMode::Guided => self.guide(&effective, &mut step),
             FlightMode::Land => self.in_land_mode(&effective, &mut step),
             // Ours only on the way home without a known home.
@@ -111,12 +115,15 @@ impl Executor {
         let follow = match goal {
             Goal::Follow { leader, .. } => {
                 let track = self.neighbours.get(leader);
-                Some(interlock::may_follow(leader, track, &self.config.limits, &self.config.fail_safe, now))
+                let jumped = self.other_jumped_m(leader, now).is_some();
+                let may = interlock::may_follow(leader, track, &self.config.limits, &self.config.fail_safe, now);
+                Some(may.and(if jumped { Err(FollowRefusal::Jumped { leader: leader.clone() }) } else { Ok(()) }))
             }
             _ => None,
         };
         let homeward = matches!(goal, Goal::Return | Goal::LandHere);
-        let conditions = Conditions { own, plan: self.plan_health(now), follow, homeward };
+        let (jumped_m, home_s) = (self.jumped_m(own, now), self.time_home_s(own));
+        let conditions = Conditions { own, plan: self.plan_health(now), follow, homeward, jumped_m, home_s };
         let alarm = self.fail_safes.step(&conditions, &self.config.fail_safe, now);
         if let Goal::Land { clearance, .. } = goal {
             if super::descent::clearance_problem(clearance.as_ref(), now).is_none() {
@@ -129,6 +136,17 @@ impl Executor {
             }
         }
         alarm
+    }
+
+    /// How long the way home takes, climb and landing included, seconds; `None` if home is unknown.
+    fn time_home_s(&self, own: &VehicleState) -> Option<f64> {
+        let home = self.config.frame.ned_from_geodetic(self.home(own)?);
+        let limits = &self.config.limits;
+        let distance_m = (home - own.position_ned_m).xy().norm();
+        let height_m = limits.return_height_m.max(limits.safe_height_m);
+        let climb_s = (height_m + own.position_ned_m.z).max(0.0) / limits.climb_mps;
+        let descent_s = height_m.max(-own.position_ned_m.z) / limits.descent_mps;
+        Some(climb_s + distance_m / limits.cruise_mps + descent_s)
     }
 
     /// Guidance in GUIDED.

@@ -27,6 +27,7 @@ impl Executor {
         self.landed_for_goal = true;
         self.restarted_at = None;
         self.fail_safes = FailSafes::default();
+        self.watch_over();
         self.let_go();
     }
 
@@ -84,6 +85,9 @@ impl Executor {
         let planned = self.direct.is_none();
         if planned && (self.plan_health(now) == PlanHealth::Lapsed || self.plan.as_ref().is_none_or(|plan| !plan.assigned)) {
             return Some("waiting for a valid plan".into());
+        }
+        if self.has_twin(now) {
+            return Some(format!("another vehicle calls itself {}", self.config.vehicle));
         }
         if !own.estimator_ok {
             return Some("waiting for the estimator's position".into());

@@ -26,6 +26,7 @@ pub enum PlanAnswer {
 impl Executor {
     /// A plan came. The number decides: an older one is refused whatever it says.
     pub fn observe_plan(&mut self, plan: &DispatchPlan, now: Stamp) -> PlanAnswer {
+        self.watch_clock(now);
         let seen = self.plan_generation();
         // However wrong the clock that wrote it, or ours: nothing is believed for longer after it came than it was to hold after
         // it was written, nor for ever.

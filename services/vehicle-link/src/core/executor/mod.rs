@@ -28,6 +28,7 @@ mod intake;
 mod payload;
 mod settle;
 mod slot;
+mod watch;
 
 use std::collections::BTreeMap;
 
@@ -50,8 +51,10 @@ use super::inverse::Inverse;
 use super::limits::{FailSafeLimits, Limits};
 use super::payload::Payload;
 use super::track::Track;
+use descent::Landing;
 use payload::Release;
 use settle::Settle;
+use watch::Watch;
 
 /// After a restart in flight, so long without a plan or a command is a lapsed plan, seconds.
 pub const RESTART_GRACE_S: f64 = 10.0;
@@ -88,8 +91,10 @@ pub enum Output {
     Setpoint(Setpoint),
     /// Ask the autopilot; tell the outcome with [`Executor::observe_outcome`].
     Request(Command),
-    /// Stop asking: the pilot took over.
+    /// Stop asking: the pilot took over, or the autopilot started again.
     Withdraw,
+    /// Ask for every stream again, and forget what the autopilot's frame was: it started again.
+    AskStreams,
     /// Tell people.
     Note(Note),
 }
@@ -187,8 +192,11 @@ pub struct Executor {
     detail: String,
     /// The autopilot's last words about a fail-safe of its own.
     autopilot_words: Option<(Stamp, String)>,
+    watch: Watch,
+    landing: Landing,
     notes: Vec<Note>,
     withdraw: bool,
+    ask_streams: bool,
 }
 
 impl Executor {
@@ -229,8 +237,11 @@ impl Executor {
             activity: Activity::Idle,
             detail: "waiting for the autopilot".into(),
             autopilot_words: None,
+            watch: Watch::default(),
+            landing: Landing::default(),
             notes: Vec::new(),
             withdraw: false,
+            ask_streams: false,
         }
     }
 
@@ -275,9 +286,14 @@ impl Executor {
 
     /// Another vehicle's state.
     pub fn observe_neighbour(&mut self, state: VehicleState, now: Stamp) {
-        if state.vehicle == self.config.vehicle || !Track::believable(&state) {
+        self.watch_clock(now);
+        if !Track::believable(&state) {
             return;
         }
+        if state.vehicle == self.config.vehicle {
+            return self.watch_name(&state, now);
+        }
+        self.watch_other(&state, now);
         if let Some(track) = self.neighbours.get_mut(&state.vehicle) {
             track.observe(state, now);
         } else if self.neighbours.len() < NEIGHBOURS_MAX {
@@ -287,6 +303,9 @@ impl Executor {
 
     /// The vehicle's own state; `mode_heard` is when its mode was last heard.
     pub fn observe_self(&mut self, state: VehicleState, mode_heard: Stamp, now: Stamp) {
+        self.watch_clock(now);
+        self.watch_self(&state, now);
+        self.landing.surface.observe(&state);
         let first = self.own.is_none();
         match self.control.observe(state.mode, state.armed, now) {
             Change::None => {}
@@ -347,11 +366,16 @@ impl Executor {
 
     /// One guidance step. Call at about 10 Hz.
     pub fn step(&mut self, now: Stamp) -> Vec<Output> {
+        self.watch_clock(now);
+        self.watch_steps(now);
         let dt_s = self.stepped.map_or(0.1, |stepped| now.seconds_since(stepped)).clamp(0.0, 0.5);
         self.stepped = Some(now);
         let mut outputs = Vec::new();
         if std::mem::take(&mut self.withdraw) {
             outputs.push(Output::Withdraw);
+        }
+        if std::mem::take(&mut self.ask_streams) {
+            outputs.push(Output::AskStreams);
         }
         let before = self.activity.clone();
         match self.own.clone() {
@@ -409,6 +433,7 @@ impl Executor {
     fn goal_changed(&mut self, goal: Option<&Goal>) {
         self.settle.reset();
         self.descending = false;
+        self.landing.start();
         self.uncleared = None;
         self.landed_for_goal = false;
         self.held = None;
@@ -457,6 +482,7 @@ impl Executor {
         self.held = None;
         self.climb = None;
         self.descending = false;
+        self.landing.start();
         self.settle.reset();
     }
 

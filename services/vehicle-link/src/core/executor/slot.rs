@@ -140,9 +140,10 @@ impl Executor {
                 let usual_m = limits.separation_m_min + limits.separation_margin_m;
                 obstacle.keep_m -= (usual_m - (apart_m - limits.slot_slack_m)).max(0.0);
             }
-            Some(obstacle)
+            // One whose position has just jumped may be at either place.
+            Some(std::iter::once(obstacle).chain(self.before_jump(id, &obstacle, now)))
         };
-        self.neighbours.iter().filter_map(near).collect()
+        self.neighbours.iter().filter_map(near).flatten().collect()
     }
 
     /// How far apart the formation has this vehicle and another, metres.

@@ -1,4 +1,4 @@
-//! Every row of the fail-safe table.
+//! The rows of the fail-safe table that concern plans, links, batteries, people and clearances; the others are in `mishaps`.
 
 use halcyon_model::{Activity, Assignment, DispatchPlan, FlightMode, Task};
 use nalgebra::Vector3;
@@ -118,7 +118,7 @@ fn a_glitch_that_passes_changes_nothing() {
 fn battery_low_returns_and_stays_returning_battery_empty_lands_here() {
     let mut world = holding();
     world.copters[0].battery = Some(0.24);
-    world.run(1.0, keep);
+    world.run(4.0, keep);
     world.copters[0].battery = Some(0.27);
     assert!(reason(&world, 0).contains("battery 24 %"), "{:?}", world.activity(0));
     world.until(120.0, keep, |world| down(world, 0));
@@ -145,8 +145,9 @@ fn outside_the_fence_it_returns_and_a_task_outside_is_refused() {
     let mut world = holding();
     let answers = world.plan(&[(0, survey(600.0, 0.0))], 5.0);
     assert!(matches!(&answers[0], PlanAnswer::RefusedInvalid(reason) if reason.contains("outside the fence")), "{answers:?}");
-    // Carried away by the wind.
-    world.copters[0].position.x = 510.0;
+    // Carried away by the wind, before anyone was looking.
+    let mut world = World::new(&[(0.0, 0.0)]);
+    world.airborne(0, Vector3::new(510.0, 0.0, -5.0));
     world.run(1.0, keep);
     assert!(reason(&world, 0).contains("outside the fence"), "{:?}", world.activity(0));
     world.until(250.0, keep, |world| down(world, 0));

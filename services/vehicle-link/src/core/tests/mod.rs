@@ -4,6 +4,7 @@ mod commands;
 mod failsafes;
 mod flights;
 mod formation;
+mod mishaps;
 mod properties;
 mod payload;
 mod world;

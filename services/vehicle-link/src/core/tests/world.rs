@@ -1,8 +1,8 @@
 //! A world of point-mass copters with ArduCopter's modes, each flown by an executor. Independent of the simulator crate.
 
 use halcyon_model::{
-    Activity, Assignment, Clearance, DispatchPlan, Fix, FleetOrigin, FlightMode, Geodetic, LandedState, LocalPoint, Role, Slot,
-    Stamp, Task, VehicleAction, VehicleCommand, VehicleId, VehicleState, VerdictState,
+    Activity, Assignment, Clearance, DispatchPlan, Fix, FleetOrigin, FlightMode, Geodetic, LandedState, LocalPoint, Range,
+    Role, Slot, Stamp, Task, VehicleAction, VehicleCommand, VehicleId, VehicleState, VerdictState,
 };
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -40,7 +40,18 @@ pub(super) struct Copter {
     /// Nothing is heard from it.
     pub(super) silent: bool,
     pub(super) holds_payload: bool,
-    home: Vector3<f64>,
+    /// What its estimator believes is where it is and this: jumps, a barometer's drift. It flies by what it believes.
+    pub(super) off: Vector3<f64>,
+    /// Seconds since it booted.
+    pub(super) boot_s: f64,
+    /// It has a rangefinder, which reads too much by this.
+    pub(super) rangefinder: Option<f64>,
+    /// Waves under it: amplitude, metres, and period, seconds.
+    pub(super) waves: (f64, f64),
+    /// It notices when it has landed.
+    pub(super) finds_ground: bool,
+    pub(super) home: Vector3<f64>,
+    surface_z: f64,
     climb_to: Option<f64>,
     setpoint: Option<Setpoint>,
     grounded_s: f64,
@@ -49,14 +60,14 @@ pub(super) struct Copter {
 
 impl Copter {
     fn on_ground(&self) -> bool {
-        self.position.z >= -0.02
+        self.position.z >= self.surface_z - 0.02
     }
 
     fn take(&mut self, command: Command) -> Result<(), crate::core::commands::CommandError> {
         let no = |result| Err(crate::core::commands::CommandError::Refused { result, words: None });
         match command {
             Command::Arm if self.ready && self.mode == FlightMode::Guided => self.armed = true,
-            Command::Disarm { force } if force || self.on_ground() => self.armed = false,
+            Command::Disarm { force } if force || self.on_ground() && self.finds_ground => self.armed = false,
             Command::SetMode(mode) => {
                 self.mode = mode;
                 self.setpoint = None;
@@ -73,6 +84,10 @@ impl Copter {
     }
 
     fn step(&mut self, dt: f64) {
+        self.boot_s += dt;
+        let (amplitude, period) = self.waves;
+        self.surface_z = -amplitude * (std::f64::consts::TAU * self.boot_s / period).sin();
+        let believed = self.position + self.off;
         let wanted = match (self.armed, self.mode) {
             (false, _) => {
                 // Without motors it falls, or stands.
@@ -86,9 +101,9 @@ impl Copter {
                     if let Some(heading) = setpoint.heading_rad {
                         self.heading = heading;
                     }
-                    setpoint.velocity_ned_mps + 1.0 * (setpoint.position_ned_m - self.position)
+                    setpoint.velocity_ned_mps + 1.0 * (setpoint.position_ned_m - believed)
                 }
-                (Some(height), None) => Vector3::new(0.0, 0.0, (-height - self.position.z).clamp(-1.5, 1.5)),
+                (Some(height), None) => Vector3::new(0.0, 0.0, (-height - believed.z).clamp(-1.5, 1.5)),
                 (None, None) => Vector3::zeros(),
             },
             (true, FlightMode::Land) => Vector3::new(0.0, 0.0, 0.5),
@@ -106,25 +121,28 @@ impl Copter {
             self.velocity += ((wanted - self.velocity) / 0.4).cap_magnitude(4.0) * dt;
         }
         self.position += self.velocity * dt;
-        if self.position.z > 0.0 {
-            self.position.z = 0.0;
+        if self.position.z > self.surface_z {
+            self.position.z = self.surface_z;
             self.velocity = Vector3::zeros();
         }
         let landing = matches!(self.mode, FlightMode::Land | FlightMode::Rtl);
-        self.grounded_s = if self.on_ground() && landing { self.grounded_s + dt } else { 0.0 };
+        self.grounded_s = if self.on_ground() && landing && self.finds_ground { self.grounded_s + dt } else { 0.0 };
         if self.grounded_s > 1.0 {
             self.armed = false;
         }
     }
 
     pub(super) fn state(&self, now: Stamp) -> VehicleState {
-        let landed = if self.on_ground() { LandedState::OnGround } else { LandedState::InAir };
+        let knows = self.on_ground() && (self.finds_ground || !self.armed);
+        let landed = if knows { LandedState::OnGround } else { LandedState::InAir };
+        let believed = self.position + self.off;
+        let range_m = self.rangefinder.map(|error| (self.surface_z - self.position.z).max(0.05) + error);
         VehicleState {
             stamp: now,
             vehicle: self.id.clone(),
             role: Role::Follower,
-            position: origin().frame().geodetic_from_ned(self.position),
-            position_ned_m: self.position,
+            position: origin().frame().geodetic_from_ned(believed),
+            position_ned_m: believed,
             velocity_ned_mps: self.velocity,
             ned_from_body: UnitQuaternion::from_euler_angles(0.0, 0.0, self.heading),
             heading_rad: self.heading,
@@ -137,13 +155,13 @@ impl Copter {
             fix: Some(Fix { kind: 3, satellites: 12, horizontal_sigma_m: None }),
             estimator_ok: self.estimator_ok,
             ready_to_arm: self.ready,
-            boot_s: 100.0,
+            boot_s: self.boot_s,
             activity: Activity::Idle,
             plan_generation: 0,
             touchdown: None,
             acceleration_ned_mps2: None,
             intent: None,
-            range: None,
+            range: range_m.map(|distance_m| Range { stamp: now, distance_m }),
             ages: halcyon_model::Ages::default(),
             link: None,
             firmware: None,
@@ -193,7 +211,13 @@ impl World {
             ready: true,
             silent: false,
             holds_payload: true,
+            off: Vector3::zeros(),
+            boot_s: 100.0,
+            rangefinder: None,
+            waves: (0.0, 4.0),
+            finds_ground: true,
             home: Vector3::new(home.0, home.1, 0.0),
+            surface_z: 0.0,
             climb_to: None,
             setpoint: None,
             grounded_s: 0.0,
@@ -259,11 +283,18 @@ impl World {
         -self.copters[index].position.z
     }
 
-    /// A tenth of a second.
-    pub(super) fn step(&mut self) {
+    /// A tenth of a second, in which only the vehicles move.
+    pub(super) fn step_vehicles(&mut self) {
         self.now = self.now.plus_secs_f64(DT_S);
         for copter in &mut self.copters {
             copter.step(DT_S);
+        }
+    }
+
+    /// A tenth of a second.
+    pub(super) fn step(&mut self) {
+        self.step_vehicles();
+        for copter in &mut self.copters {
             if !copter.silent || copter.frozen.is_none() {
                 copter.frozen = Some(copter.state(self.now));
             }
@@ -290,7 +321,7 @@ impl World {
                         executor.observe_outcome(command, &outcome, self.now);
                     }
                     Output::Note(note) => self.notes.push((index, note.clone())),
-                    Output::Withdraw => {}
+                    Output::Withdraw | Output::AskStreams => {}
                 }
             }
         }
@@ -346,6 +377,7 @@ pub(super) fn land(north_m: f64, east_m: f64, cleared_until: Option<Stamp>) -> T
             verdict: VerdictState::Safe,
             sea_state_stamp: t0(),
             valid_until,
+            windows: Vec::new(),
         }),
     }
 }
