@@ -8,6 +8,8 @@ APT := libopencv-core-dev libopencv-calib3d-dev libopencv-imgcodecs-dev libopenc
 APT_TEST := chromium python3-venv
 SUDO := $(if $(filter 0,$(shell id -u)),,sudo)
 PYTHON := target/venv/bin/python
+# Ground stations' libraries that know nothing of Halcyon, as its judges.
+STACKS := pymavlink==2.4.50 mavsdk==4.1.0
 
 help: ## this list
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -41,7 +43,8 @@ setup: ## install what is missing: system packages, npm packages
 setup-test:
 	@sh tests/setup.sh "$(SUDO)" $(APT_TEST)
 	@test -x $(PYTHON) || python3 -m venv target/venv
-	@$(PYTHON) -c 'import pymavlink' 2>/dev/null || target/venv/bin/pip install --quiet --disable-pip-version-check pymavlink
+	@$(PYTHON) -c 'import importlib.metadata as m; exit(any(m.version(p) != v for p, v in (q.split("==") for q in "$(STACKS)".split())))' 2>/dev/null \
+		|| target/venv/bin/pip install --quiet --disable-pip-version-check $(STACKS)
 
 web: setup ## build the dashboard
 	cd web && npm run --silent build

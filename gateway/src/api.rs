@@ -19,6 +19,7 @@ pub mod sea_states;
 pub mod services;
 pub mod shell;
 pub mod stream;
+pub mod transfers;
 pub mod vehicles;
 
 use axum::Router;

@@ -113,6 +113,16 @@ impl App {
     }
 }
 
+impl App {
+    /// The same for what is read from an autopilot or written to it as a whole.
+    #[must_use]
+    pub fn transfer_limit(&self, issued: Stamp) -> (Duration, Stamp) {
+        let timeout_s = self.config.transfer_timeout_s;
+        // The vehicle's own reason for being late comes before we stop listening.
+        (Duration::from_secs_f64(timeout_s), issued.plus_secs_f64(0.95 * timeout_s * self.speed))
+    }
+}
+
 impl std::ops::Deref for App {
     type Target = Inner;
     fn deref(&self) -> &Inner {

@@ -18,7 +18,10 @@ pub struct Config {
     pub allowed_hosts: Vec<String>,
     /// How long a command may take to be accepted or refused, seconds.
     pub command_timeout_s: f64,
-    /// How long any request may take to be answered, seconds.
+    /// How long parameters, a mission, a fence or rally points may take to be read or written, seconds. All parameters of an
+    /// autopilot take half a minute over a slow radio.
+    pub transfer_timeout_s: f64,
+    /// How long any other request may take to be answered, seconds.
     pub request_timeout_s: f64,
     /// A connection on which nothing moves for this long is closed, seconds.
     pub idle_timeout_s: f64,
@@ -54,6 +57,7 @@ impl Default for Config {
             listen: SocketAddr::from(([127, 0, 0, 1], 8080)),
             allowed_hosts: Vec::new(),
             command_timeout_s: 5.0,
+            transfer_timeout_s: 50.0,
             request_timeout_s: 30.0,
             idle_timeout_s: 60.0,
             body_bytes_max: 64 * 1024,
@@ -96,6 +100,7 @@ impl halcyon_chassis::Section for Config {
     fn validate(&self) -> Result<(), String> {
         let seconds = [
             ("command_timeout_s", self.command_timeout_s),
+            ("transfer_timeout_s", self.transfer_timeout_s),
             ("request_timeout_s", self.request_timeout_s),
             ("idle_timeout_s", self.idle_timeout_s),
             ("vehicle_stale_s", self.vehicle_stale_s),
@@ -116,11 +121,10 @@ impl halcyon_chassis::Section for Config {
             ));
         }
         // A connection must outlive the request that it carries.
-        if self.idle_timeout_s <= self.request_timeout_s {
-            return Err(format!(
-                "[gateway] idle_timeout_s must be above request_timeout_s ({}), not {}",
-                self.request_timeout_s, self.idle_timeout_s
-            ));
+        for (key, value) in [("request_timeout_s", self.request_timeout_s), ("transfer_timeout_s", self.transfer_timeout_s)] {
+            if self.idle_timeout_s <= value {
+                return Err(format!("[gateway] idle_timeout_s must be above {key} ({value}), not {}", self.idle_timeout_s));
+            }
         }
         let counts = [
             ("connections_max", self.connections_max),
@@ -173,6 +177,7 @@ mod tests {
         check("vehicle_stale_s", |config| config.vehicle_stale_s = -1.0);
         check("request_timeout_s", |config| config.request_timeout_s = 1.0);
         check("idle_timeout_s", |config| config.idle_timeout_s = 20.0);
+        check("idle_timeout_s", |config| config.transfer_timeout_s = 90.0);
         check("streams_max", |config| config.streams_max = 0);
         check("body_bytes_max", |config| config.body_bytes_max = 0);
         check("allowed_hosts", |config| config.allowed_hosts = vec!["http://x".into()]);

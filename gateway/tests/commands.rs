@@ -8,7 +8,10 @@ use std::time::Duration;
 
 use halcyon_gateway::Config;
 use halcyon_gateway::port::CommandFailure;
-use halcyon_model::{Approval, CommandReply, FlightMode, MissionAction, MissionPhase, VehicleAction};
+use halcyon_model::{
+    Approval, CommandReply, Content, FlightMode, FormationSpec, Item, ItemFrame, ItemKind, MissionAction, MissionPhase, Parameter,
+    ParameterKind, ParameterName, Shape, VehicleAction, VehicleId,
+};
 use serde_json::json;
 use support::*;
 
@@ -241,4 +244,131 @@ async fn other_names_and_other_pages_are_turned_away() {
     gateway.send(post("null")).await.is_problem(403, "origin");
     assert_eq!(gateway.send(post(&format!("http://{}", gateway.address))).await.status, 202);
     assert_eq!(created(&gateway).len(), 1);
+}
+
+#[tokio::test]
+async fn formations_are_ordered_and_disbanded_in_the_planners_words() {
+    let gateway = gateway().await;
+    let body = json!({"leader": "leader-1", "shape": "vee", "spacing_m": 8.5, "followers": ["b", "a"]});
+    let answer = gateway.post("/api/v1/formations", &body).await;
+    assert_eq!((answer.status, answer.headers["location"].to_str().unwrap()), (202, "/api/v1/formations"), "{answer:?}");
+    let id = |text: &str| VehicleId::new(text).unwrap();
+    let asked = FormationSpec { leader: id("leader-1"), shape: Shape::Vee, spacing_m: 8.5, followers: vec![id("b"), id("a")] };
+    assert_eq!(gateway.played.mission_commands.lock().unwrap()[0].action, MissionAction::Form(asked));
+    let bad = async |key: &str, value: serde_json::Value, words: &str| {
+        let mut body = body.clone();
+        body[key] = value;
+        gateway.post("/api/v1/formations", &body).await.is_problem(422, words);
+    };
+    bad("leader", json!("a/b"), "a/b").await;
+    bad("shape", json!("ring"), "ring").await;
+    bad("spacing_m", json!(0), "spacing_m must be above 0").await;
+    bad("spacing_m", json!(1e9), "spacing_m must be above 0").await;
+    bad("followers", json!(["a", ""]), "empty").await;
+    gateway.post("/api/v1/formations/nobody/disband", &json!(null)).await.is_problem(404, "no vehicle nobody");
+    assert_eq!(gateway.played.mission_commands.lock().unwrap().len(), 1);
+}
+
+fn with_content(content: Content) -> Result<CommandReply, CommandFailure> {
+    Ok(CommandReply { content: Some(content), ..CommandReply::accepted(at(0.0), "read") })
+}
+
+#[tokio::test]
+async fn parameters_are_read_and_set() {
+    let gateway = gateway().await;
+    gateway.app.store.write().vehicle(vehicle("f-1", 0.1), at(0.0));
+    let path = "/api/v1/vehicles/f-1/parameters";
+    let rtl = || Parameter { name: ParameterName::new("RTL_ALT").unwrap(), value: 1500.0, kind: ParameterKind::Int32 };
+    let refused = || Ok(CommandReply::refused(at(0.0), "the autopilot knows no parameter X"));
+    *gateway.played.answers.lock().unwrap() = vec![
+        with_content(Content::Parameters(vec![rtl(), rtl()])),
+        with_content(Content::Parameters(vec![rtl()])),
+        with_content(Content::Parameters(vec![rtl()])),
+        refused(),
+        Err(CommandFailure::Timeout(Duration::from_secs(50))),
+    ];
+    let all = gateway.get(path).await;
+    assert_eq!(all.status, 200, "{all:?}");
+    assert_eq!(all.json["parameters"][1], json!({"name": "RTL_ALT", "value": 1500.0, "type": "int32"}));
+    gateway.get(&format!("{path}?name=RTL_ALT")).await;
+    let put = |name: &str, body: serde_json::Value| gateway.client.put(gateway.url(&format!("{path}/{name}"))).json(&body);
+    let set = gateway.send(put("RTL_ALT", json!({"value": 1500})).header("halcyon-operator", "Ada")).await;
+    assert_eq!((set.status, &set.json["value"]), (200, &json!(1500.0)));
+    gateway.send(put("X", json!({"value": 1, "even_in_flight": true}))).await.is_problem(409, "knows no parameter");
+    gateway.get(path).await.is_problem(504, "not known");
+    gateway.send(put("A%20B", json!({"value": 1}))).await.is_problem(422, "parameter name");
+    gateway.send(put("X", json!({"value": "much"}))).await.is_problem(422, "value");
+    gateway.get(&format!("{path}?name=é")).await.is_problem(422, "parameter name");
+    gateway.get("/api/v1/vehicles/none/parameters").await.is_problem(404, "none");
+    let commands = gateway.played.vehicle_commands.lock().unwrap();
+    let name = |text: &str| ParameterName::new(text).unwrap();
+    let actions: Vec<_> = commands.iter().map(|command| command.action.clone()).collect();
+    let expected = [
+        VehicleAction::ReadParameters,
+        VehicleAction::ReadParameter { name: name("RTL_ALT") },
+        VehicleAction::SetParameter { name: name("RTL_ALT"), value: 1500.0, even_in_flight: false },
+        VehicleAction::SetParameter { name: name("X"), value: 1.0, even_in_flight: true },
+        VehicleAction::ReadParameters,
+    ];
+    assert_eq!(actions, expected);
+    assert_eq!(commands[2].who, "Ada");
+    assert!(commands[0].deadline.seconds_since(commands[0].stamp) > 30.0);
+}
+
+#[tokio::test]
+async fn missions_fences_and_rally_points_go_both_ways() {
+    let gateway = gateway().await;
+    gateway.app.store.write().vehicle(vehicle("f-1", 0.1), at(0.0));
+    let path = |list: &str| format!("/api/v1/vehicles/f-1/{list}");
+    let items = vec![Item {
+        command: 16,
+        frame: ItemFrame::Home,
+        parameters: [None, Some(2.0), None, None],
+        latitude_deg: Some(45.1),
+        longitude_deg: Some(7.0),
+        altitude_m: Some(5.0),
+        autocontinue: true,
+    }];
+    *gateway.played.answers.lock().unwrap() = vec![with_content(Content::Items(items.clone()))];
+    let read = gateway.get(&path("mission")).await;
+    assert_eq!(read.status, 200, "{read:?}");
+    assert_eq!((&read.json["kind"], &read.json["items"][0]["command"]), (&json!("mission"), &json!("NAV_WAYPOINT")));
+    assert_eq!(read.json["items"][0]["parameters"], json!([null, 2.0, null, null]));
+    let put = |list: &str, body: &serde_json::Value| gateway.client.put(gateway.url(&path(list))).json(body);
+    let body = json!({"items": read.json["items"]});
+    assert_eq!(gateway.send(put("mission", &body)).await.status, 200);
+    assert_eq!(gateway.send(gateway.client.delete(gateway.url(&path("rally")))).await.status, 200);
+    let actions: Vec<_> =
+        gateway.played.vehicle_commands.lock().unwrap().iter().map(|command| command.action.clone()).collect();
+    let expected = [
+        VehicleAction::DownloadItems { kind: ItemKind::Mission },
+        VehicleAction::UploadItems { kind: ItemKind::Mission, items },
+        VehicleAction::ClearItems { kind: ItemKind::Rally },
+    ];
+    assert_eq!(actions, expected);
+
+    gateway.send(put("fence", &body)).await.is_problem(422, "item 1: command 16");
+    let one = |item: serde_json::Value| json!({"items": [item]});
+    let far = one(json!({"command": "mav_cmd_nav_waypoint", "frame": "home", "latitude_deg": 91}));
+    gateway.send(put("mission", &far)).await.is_problem(422, "latitude_deg");
+    gateway.send(put("mission", &one(json!({"command": "DANCE", "frame": "home"})))).await.is_problem(422, "DANCE");
+    gateway.send(put("mission", &one(json!({"command": 16, "frame": "moon"})))).await.is_problem(422, "moon");
+    let waypoint = json!({"command": 16, "frame": "home", "latitude_deg": 45.123_456_7, "longitude_deg": 7.123_456_7});
+    gateway.send(put("mission", &json!({"items": vec![waypoint.clone(); 701]}))).await.is_problem(422, "at most 700");
+    assert_eq!(gateway.send(put("mission", &json!({"items": vec![waypoint; 700]}))).await.status, 200);
+    gateway.get(&path("nothing")).await.is_problem(404, "no such resource");
+    assert_eq!(gateway.played.vehicle_commands.lock().unwrap().len(), 4, "what is refused here was not sent");
+}
+
+#[tokio::test]
+async fn the_payload_is_a_command() {
+    let gateway = gateway().await;
+    gateway.app.store.write().vehicle(vehicle("f-1", 0.1), at(0.0));
+    for action in ["release_payload", "secure_payload", "cancel_transfer"] {
+        let answer = gateway.post("/api/v1/vehicles/f-1/commands", &json!({"action": action})).await;
+        assert_eq!(answer.status, 202, "{answer:?}");
+    }
+    let actions: Vec<_> =
+        gateway.played.vehicle_commands.lock().unwrap().iter().map(|command| command.action.clone()).collect();
+    assert_eq!(actions, [VehicleAction::ReleasePayload, VehicleAction::SecurePayload, VehicleAction::CancelTransfer]);
 }

@@ -34,8 +34,13 @@ class Ground:
         self.link = mavutil.mavlink_connection(connect, source_system=255, source_component=190, retries=30)
         self.texts = []
         self.latest = {}
+        self.said_s = -math.inf
 
     def pump(self, wait_s=0.05):
+        if time.monotonic() - self.said_s >= 1.0:
+            # As every ground station; a relay over UDP learns from it where we are.
+            self.said_s = time.monotonic()
+            self.link.mav.heartbeat_send(M.MAV_TYPE_GCS, M.MAV_AUTOPILOT_INVALID, 0, 0, M.MAV_STATE_ACTIVE)
         message = self.link.recv_match(blocking=True, timeout=wait_s)
         if message is None:
             return None
@@ -114,6 +119,116 @@ def check(what, holds, found=""):
         raise Failed(f"{what}: {found}")
 
 
+def items_of(link, mission_type, entries):
+    """Items of the mission protocol from (command, param1, latitude, longitude, height)."""
+    return [
+        M.MAVLink_mission_item_int_message(
+            link.target_system, 1, seq, M.MAV_FRAME_GLOBAL_RELATIVE_ALT, command, 0, 1, param1, 0, 0, 0,
+            round(latitude * 1e7), round(longitude * 1e7), height, mission_type)
+        for seq, (command, param1, latitude, longitude, height) in enumerate(entries)
+    ]
+
+
+def upload(ground, mission_type, items):
+    """As the protocol's page has it: count, one item for each request, acknowledgement."""
+    link = ground.link
+    link.mav.mission_count_send(link.target_system, 1, len(items), mission_type)
+    kinds = ("MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK")
+    for _ in range(2 * len(items) + 1):
+        message = ground.until(
+            f"an answer to an upload of type {mission_type}",
+            lambda m: m.get_type() in kinds and m.mission_type == mission_type, 10)
+        if message.get_type() == "MISSION_ACK":
+            return message.type
+        link.mav.send(items[message.seq])
+    raise Failed("an upload never ends")
+
+
+def download(ground, mission_type):
+    link = ground.link
+    link.mav.mission_request_list_send(link.target_system, 1, mission_type)
+    count = ground.until("a count", lambda m: m.get_type() == "MISSION_COUNT" and m.mission_type == mission_type, 10).count
+    found = []
+    for seq in range(count):
+        link.mav.mission_request_int_send(link.target_system, 1, seq, mission_type)
+        found.append(ground.until(
+            f"item {seq}",
+            lambda m: m.get_type() == "MISSION_ITEM_INT" and m.seq == seq and m.mission_type == mission_type, 10))
+    link.mav.mission_ack_send(link.target_system, 1, M.MAV_MISSION_ACCEPTED, mission_type)
+    return found
+
+
+def transfers(ground, figures):
+    """Fence and rally points, up and down."""
+    link = ground.link
+    position = ground.latest["GLOBAL_POSITION_INT"]
+    latitude, longitude = position.lat * 1e-7, position.lon * 1e-7
+    vertex, rock = M.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION, M.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION
+    corners = [(vertex, 5, latitude + north, longitude + east, 0)
+               for north, east in ((2e-3, 2e-3), (2e-3, -2e-3), (0, -3e-3), (-2e-3, -2e-3), (-2e-3, 2e-3))]
+    fence = items_of(link, M.MAV_MISSION_TYPE_FENCE, corners + [(rock, 12.5, latitude + 1e-3, longitude + 1e-3, 0)])
+    rally = items_of(link, M.MAV_MISSION_TYPE_RALLY, [(M.MAV_CMD_NAV_RALLY_POINT, 0, latitude + 1e-3, longitude, 8)])
+    for mission_type, items in ((M.MAV_MISSION_TYPE_FENCE, fence), (M.MAV_MISSION_TYPE_RALLY, rally)):
+        check(f"items of type {mission_type} are taken", upload(ground, mission_type, items) == M.MAV_MISSION_ACCEPTED)
+        key = lambda item: (item.command, item.param1, item.x, item.y, item.z)  # noqa: E731
+        sent, read = [key(item) for item in items], [key(item) for item in download(ground, mission_type)]
+        check(f"items of type {mission_type} come back", sent == read, f"{sent} {read}")
+    check("FENCE_TOTAL counts them", ground.param("FENCE_TOTAL") == len(fence))
+    # A fence of two corners is none.
+    check("half a fence is refused", upload(ground, M.MAV_MISSION_TYPE_FENCE, fence[:2]) == M.MAV_MISSION_ERROR)
+    link.mav.mission_clear_all_send(link.target_system, 1, M.MAV_MISSION_TYPE_RALLY)
+    ground.until("cleared", lambda m: m.get_type() == "MISSION_ACK" and m.mission_type == M.MAV_MISSION_TYPE_RALLY, 5)
+    check("rally points are cleared", download(ground, M.MAV_MISSION_TYPE_RALLY) == [])
+    figures["fence_items"] = len(fence)
+
+
+def synchronise(ground, figures):
+    """TIMESYNC: our time comes back with the vehicle's, in nanoseconds since its boot."""
+    trips = []
+    for _ in range(10):
+        sent_ns = time.monotonic_ns()
+        ground.link.mav.timesync_send(0, sent_ns)
+        answer = ground.until("TIMESYNC", lambda m: m.get_type() == "TIMESYNC" and m.ts1 == sent_ns, 5)
+        trips.append((time.monotonic_ns() - sent_ns) * 1e-6)
+        check("it is its time since boot", abs(answer.tc1 * 1e-9 - ground.boot_s()) < 1.0, f"{answer.tc1} {ground.boot_s()}")
+    figures["timesync_ms"] = round(min(trips), 1)
+
+
+def payload(ground):
+    check("no gripper, no grip", ground.command(M.MAV_CMD_DO_GRIPPER, 1, 0) == M.MAV_RESULT_FAILED)
+    ground.param("GRIP_ENABLE", 1)
+    ground.param("SERVO9_FUNCTION", 28)
+    for action, width_us in ((1, 1900), (0, 1100)):
+        ground.accepted(M.MAV_CMD_DO_GRIPPER, 1, action)
+        ground.accepted(M.MAV_CMD_REQUEST_MESSAGE, M.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW)
+        check("the servo moves", ground.latest["SERVO_OUTPUT_RAW"].servo9_raw == width_us)
+
+
+def sign(ground, figures):
+    """A key for the vehicle: from then on it hears only what is signed with it, and signs what it says."""
+    link, key = ground.link, bytes(range(32))
+    link.mav.setup_signing_send(link.target_system, 1, list(key), 1)
+    ground.for_vehicle_s(0.5)
+    # pymavlink still sends without a signature, and takes what comes with one.
+    link.mav.param_request_read_send(link.target_system, 1, b"WPNAV_SPEED", -1)
+    silent_until = time.monotonic() + 1.0
+    while time.monotonic() < silent_until:
+        message = ground.pump()
+        check("nothing unsigned is answered", message is None or message.get_type() != "PARAM_VALUE")
+    seen = []
+    link.setup_signing(key, sign_outgoing=True, allow_unsigned_callback=lambda _, message_id: seen.append(message_id) and False)
+    check("a signed question is answered", ground.param("WPNAV_SPEED") > 0)
+    ground.for_vehicle_s(2)
+    check("everything it says is signed", not seen, seen[:5])
+    check("an answer is signed", ground.latest["PARAM_VALUE"].get_signed())
+    # No key again: with one the rest would prove less.
+    link.mav.setup_signing_send(link.target_system, 1, [0] * 32, 0)
+    link.disable_signing()
+    ground.for_vehicle_s(0.5)
+    check("without a key it hears all", ground.param("WPNAV_SPEED") > 0)
+    figures["signed"] = True
+
+
 def fly(ground, figures):
     link = ground.link
     heartbeat = link.wait_heartbeat(timeout=30)
@@ -121,7 +236,8 @@ def fly(ground, figures):
     check("a quadrotor by ArduPilot", (heartbeat.type, heartbeat.autopilot) == (M.MAV_TYPE_QUADROTOR, M.MAV_AUTOPILOT_ARDUPILOTMEGA))
     for message, rate_hz in ((M.MAVLINK_MSG_ID_LOCAL_POSITION_NED, 20), (M.MAVLINK_MSG_ID_EKF_STATUS_REPORT, 4),
                              (M.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, 4), (M.MAVLINK_MSG_ID_SIMSTATE, 20),
-                             (M.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, 20), (M.MAVLINK_MSG_ID_SYS_STATUS, 4)):
+                             (M.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, 20), (M.MAVLINK_MSG_ID_SYS_STATUS, 4),
+                             (M.MAVLINK_MSG_ID_DISTANCE_SENSOR, 20), (M.MAVLINK_MSG_ID_ATTITUDE, 20)):
         ground.accepted(M.MAV_CMD_SET_MESSAGE_INTERVAL, message, 1e6 / rate_hz)
 
     # Refusals come with an answer.
@@ -147,6 +263,10 @@ def fly(ground, figures):
     needed = M.EKF_POS_HORIZ_ABS | M.EKF_ATTITUDE
     ground.until("a good position", lambda m: m.get_type() == "EKF_STATUS_REPORT" and m.flags & needed == needed, 90)
     figures["ready_s"] = round(ground.boot_s(), 1)
+    transfers(ground, figures)
+    synchronise(ground, figures)
+    payload(ground)
+    sign(ground, figures)
     ground.mode("GUIDED")
     ground.accepted(M.MAV_CMD_COMPONENT_ARM_DISARM, 1)
     ground.armed(True, 5)
@@ -169,6 +289,14 @@ def fly(ground, figures):
     figures["hold_mean_m"] = round(sum(errors) / len(errors), 3)
     figures["hold_max_m"] = round(max(errors), 3)
     check("it holds the place", figures["hold_max_m"] < 0.8, figures)
+
+    if "DISTANCE_SENSOR" in ground.latest:
+        sensor, lean = ground.latest["DISTANCE_SENSOR"], ground.latest["ATTITUDE"]
+        low = sensor.current_distance * 0.01 * math.cos(lean.roll) * math.cos(lean.pitch)
+        figures["range_error_m"] = round(low - (home[2] - ground.place()[2]), 2)
+        check("it looks down", sensor.orientation == M.MAV_SENSOR_ROTATION_PITCH_270)
+        # The water's waves and the barometer's wander lie between.
+        check("the rangefinder sees the water", abs(figures["range_error_m"]) < 1.0, figures)
 
     # A velocity is flown while it is repeated, and dropped 3 s after.
     start = ground.boot_s()

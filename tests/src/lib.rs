@@ -122,6 +122,20 @@ impl Drop for Running {
     }
 }
 
+/// Runs one of `tests/ground_station`'s programs against an address, in the Python that `make setup-test` made.
+///
+/// # Panics
+/// If it finds a fault; with what it said.
+pub fn judge(program: &str, connect: &str) {
+    let python = root().join("target/venv/bin/python");
+    assert!(python.is_file(), "{} is missing: `make test` makes it", python.display());
+    let program = root().join("tests/ground_station").join(program);
+    let output = Command::new(python).arg(&program).args(["--connect", connect]).output().expect("python runs");
+    let text = format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{}: {text}", program.display());
+    println!("{text}");
+}
+
 /// Waits until `condition`, at most `bound`.
 ///
 /// # Panics

@@ -276,6 +276,10 @@ export class World {
       estimator_ok: true, ready_to_arm: true, boot_s: this.t_s() + 40,
       activity: { kind, settled, slot_error_m: kind === 'following' ? one.away_m ?? null : null, reason: null }, plan_generation: this.generation,
       home: { latitude_deg: point(one.home).latitude_deg, longitude_deg: point(one.home).longitude_deg, altitude_m: 0 }, touchdown: one.touchdown ? point(one.touchdown) : null,
+      acceleration: { north_mps2: 0, east_mps2: 0, down_mps2: 0 }, range_m: onGround || one.height_m > 40 ? null : one.height_m,
+      ages: { mode_s: 0.4, attitude_s: 0.05, landed_s: 0.4, battery_s: 0.4, fix_s: 0.2, estimator_s: 0.2, home_s: 1.5 },
+      link: { loss_percent: 0.4, round_trip_ms: 12, received: 40 * Math.floor(this.t_s()), signed: false },
+      firmware: { autopilot: 'ArduPilot', vehicle: 'quadrotor', version: '4.6.0' },
     };
   }
 

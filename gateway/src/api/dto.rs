@@ -12,6 +12,7 @@ mod sea;
 mod service;
 mod stream;
 mod surface;
+mod transfer;
 mod vehicle;
 
 use halcyon_model::{FleetOrigin, Geodetic, LocalFrame, LocalPoint, Stamp};
@@ -30,7 +31,10 @@ pub use sea::{
 pub use service::{Event, HealthState, Readiness, ReadinessCheck, Service, Severity};
 pub use stream::{Heartbeat, Hello, StreamMessage};
 pub use surface::{Preview, Series, SeriesSample, Surface, WaveHeightSample};
-pub use vehicle::{Activity, ActivityKind, Fix, FixKind, LandedState, LocalPosition, Position, Role, Vehicle, VelocityNed};
+pub use transfer::{
+    CommandId, Frame, Item, ItemList, ItemUpload, ListKind, Parameter, ParameterList, ParameterType, SetParameter,
+};
+pub use vehicle::{AccelerationNed, Activity, ActivityKind, Ages, Firmware, Fix, FixKind, LandedState, LinkQuality, LocalPosition, Position, Role, Vehicle, VelocityNed};
 
 /// What conversion to JSON needs beside the noun itself: the fleet's local frame and the present.
 #[derive(Debug, Clone, Copy)]

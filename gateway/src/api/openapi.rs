@@ -2,6 +2,7 @@
 
 use std::sync::OnceLock;
 
+use axum::extract::DefaultBodyLimit;
 use axum::http::header;
 use axum::response::IntoResponse;
 use utoipa::OpenApi as _;
@@ -12,8 +13,11 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use super::dto::{Problem, StreamMessage};
-use super::{events, formations, missions, plan, probes, rigs, sea_states, services, stream, vehicles};
+use super::{events, formations, missions, plan, probes, rigs, sea_states, services, stream, transfers, vehicles};
 use crate::app::App;
+
+/// Largest body of an upload of items: 700 with all digits are 200 kB.
+const ITEMS_BYTES_MAX: usize = 512 * 1024;
 
 #[derive(utoipa::OpenApi)]
 #[openapi(
@@ -27,6 +31,7 @@ use crate::app::App;
     ),
     tags(
         (name = "vehicles", description = "What flies, and commands to it"),
+        (name = "autopilot", description = "Parameters, missions, fences and rally points that an autopilot keeps"),
         (name = "missions", description = "Survey, assess, approve, dispatch, land"),
         (name = "sea", description = "What the rigs measure"),
         (name = "fleet", description = "Plan, services, events, live stream"),
@@ -54,17 +59,22 @@ fn header_parameter(name: &str, description: &str, pattern: &str) -> RefOr<Param
     RefOr::T(parameter)
 }
 
-fn complete(operation: &mut Operation, post: bool) {
+fn complete(operation: &mut Operation, post: bool, changes: bool) {
     operation.responses.responses.insert("default".into(), RefOr::T(problem_response()));
+    let mut headers = Vec::new();
     if post {
-        operation.parameters.get_or_insert_default().extend([
-            header_parameter(
-                "Idempotency-Key",
-                "Makes a repeat harmless: the same key with the same request gets the first answer again.",
-                "^[!-~]{1,255}$",
-            ),
-            header_parameter("Halcyon-Operator", "Who commands this, for the record.", "^[!-~]([ -~]{0,62}[!-~])?$"),
-        ]);
+        headers.push(header_parameter(
+            "Idempotency-Key",
+            "Makes a repeat harmless: the same key with the same request gets the first answer again.",
+            "^[!-~]{1,255}$",
+        ));
+    }
+    if changes {
+        let description = "Who commands this, for the record.";
+        headers.push(header_parameter("Halcyon-Operator", description, "^[!-~]([ -~]{0,62}[!-~])?$"));
+    }
+    if !headers.is_empty() {
+        operation.parameters.get_or_insert_default().extend(headers);
     }
 }
 
@@ -76,6 +86,14 @@ pub fn routes() -> OpenApiRouter<App> {
         .routes(routes!(vehicles::command))
         .routes(routes!(formations::list, formations::order))
         .routes(routes!(formations::disband))
+        .routes(routes!(transfers::read_parameters))
+        .routes(routes!(transfers::set_parameter))
+        .merge(
+            // Hundreds of items are more than a command has.
+            OpenApiRouter::new()
+                .routes(routes!(transfers::download, transfers::upload, transfers::clear))
+                .layer(DefaultBodyLimit::max(ITEMS_BYTES_MAX)),
+        )
         .routes(routes!(missions::list, missions::create))
         .routes(routes!(missions::show))
         .routes(routes!(missions::approve))
@@ -106,9 +124,15 @@ pub fn routes() -> OpenApiRouter<App> {
 pub fn document() -> OpenApi {
     let mut document = routes().into_openapi();
     for path in document.paths.paths.values_mut() {
-        for (operation, post) in [(&mut path.get, false), (&mut path.post, true)] {
+        let operations = [
+            (&mut path.get, false, false),
+            (&mut path.post, true, true),
+            (&mut path.put, false, true),
+            (&mut path.delete, false, true),
+        ];
+        for (operation, post, changes) in operations {
             if let Some(operation) = operation {
-                complete(operation, post);
+                complete(operation, post, changes);
             }
         }
     }

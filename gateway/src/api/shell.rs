@@ -10,6 +10,7 @@ use axum::response::{IntoResponse, Response};
 use tokio::time::Instant;
 
 use super::problem::{ApiError, name_the_path};
+use super::transfers;
 use crate::app::App;
 
 /// Scripts only from here; styles may be inline, since chart libraries write them; workers may be blobs, since map libraries
@@ -34,7 +35,9 @@ fn set_if_absent(headers: &mut HeaderMap, name: HeaderName, value: &'static str)
 /// Bounds the time to an answer, writes problems and adds the security headers.
 pub async fn layer(State(app): State<App>, request: Request, next: Next) -> Response {
     let path = request.uri().path().to_owned();
-    let limit = Duration::from_secs_f64(app.config.request_timeout_s);
+    // Transfers with an autopilot bound themselves, and are told why they took too long.
+    let transfer_s = if transfers::is_one(&path) { app.config.transfer_timeout_s + 1.0 } else { 0.0 };
+    let limit = Duration::from_secs_f64(app.config.request_timeout_s.max(transfer_s));
     // Wall time: it bounds what a client may hold.
     let response = match tokio::time::timeout(limit, next.run(request)).await {
         Ok(response) => response,
@@ -57,7 +60,7 @@ pub async fn observe(request: Request, next: Next) -> Response {
     let response = next.run(request).await;
     let status = response.status().as_u16().to_string();
     let method = match method.as_str() {
-        known @ ("GET" | "HEAD" | "POST" | "OPTIONS") => known.to_owned(),
+        known @ ("GET" | "HEAD" | "POST" | "PUT" | "DELETE" | "OPTIONS") => known.to_owned(),
         // Methods are the client's to make up; labels must stay few.
         _ => "other".into(),
     };

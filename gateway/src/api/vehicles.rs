@@ -64,7 +64,7 @@ pub async fn command(
     Ok((StatusCode::ACCEPTED, [(header::LOCATION, watch.clone())], Json(CommandResult::new(&reply, watch))).into_response())
 }
 
-fn unknown(id: &VehicleId) -> ApiError {
+pub(super) fn unknown(id: &VehicleId) -> ApiError {
     ApiError::NotFound(format!("no vehicle {id} was ever heard"))
 }
 
@@ -103,5 +103,8 @@ fn action(app: &App, request: VehicleCommandRequest) -> Result<VehicleAction, Ap
             VehicleAction::SetHeading { heading_rad: heading_deg.rem_euclid(360.0).to_radians() }
         }
         Asked::Terminate => VehicleAction::Terminate,
+        Asked::ReleasePayload => VehicleAction::ReleasePayload,
+        Asked::SecurePayload => VehicleAction::SecurePayload,
+        Asked::CancelTransfer => VehicleAction::CancelTransfer,
     })
 }

@@ -4,6 +4,7 @@ use super::formation::{formation_from, formation_to};
 use super::geo::{point_from, point_to};
 use super::mission::{spec_from, spec_to};
 use super::plan::{slot_from, slot_to};
+use super::transfer::{content_from, content_to, items_from, items_to, kind_from, kind_to, name_from};
 use crate::field::{FieldError, Within, finite, header, id, optional_id, positive, required, text};
 use crate::{SCHEMA_VERSION, Wire, v1};
 
@@ -18,6 +19,7 @@ impl Wire for CommandReply {
             accepted: self.accepted,
             reason: self.reason.clone(),
             mission_id: self.mission.as_ref().map(ToString::to_string).unwrap_or_default(),
+            content: self.content.as_ref().map(content_to),
         }
     }
 
@@ -27,6 +29,7 @@ impl Wire for CommandReply {
             accepted: proto.accepted,
             reason: text("reason", proto.reason)?,
             mission: optional_id("mission_id", &proto.mission_id)?,
+            content: proto.content.map(content_from).transpose()?,
         })
     }
 }
@@ -99,6 +102,21 @@ fn action_to(action: &VehicleAction) -> v1::vehicle_command::Action {
         VehicleAction::SetMode(mode) => Action::SetMode(mode.copter_number()),
         VehicleAction::SetHeading { heading_rad } => Action::SetHeadingRad(*heading_rad),
         VehicleAction::Terminate => Action::Terminate(nothing),
+        VehicleAction::ReadParameter { name } => Action::ReadParameter(name.to_string()),
+        VehicleAction::ReadParameters => Action::ReadParameters(nothing),
+        VehicleAction::SetParameter { name, value, even_in_flight } => Action::SetParameter(v1::SetParameter {
+            name: name.to_string(),
+            value: *value,
+            even_in_flight: *even_in_flight,
+        }),
+        VehicleAction::DownloadItems { kind } => Action::DownloadItems(kind_to(*kind)),
+        VehicleAction::UploadItems { kind, items } => {
+            Action::UploadItems(v1::UploadItems { kind: kind_to(*kind), items: items_to(items) })
+        }
+        VehicleAction::ClearItems { kind } => Action::ClearItems(kind_to(*kind)),
+        VehicleAction::CancelTransfer => Action::CancelTransfer(nothing),
+        VehicleAction::ReleasePayload => Action::ReleasePayload(nothing),
+        VehicleAction::SecurePayload => Action::SecurePayload(nothing),
     }
 }
 
@@ -124,6 +142,22 @@ fn action_from(action: v1::vehicle_command::Action) -> Result<VehicleAction, Fie
             VehicleAction::SetHeading { heading_rad: finite("set_heading_rad", heading_rad)? }
         }
         Action::Terminate(_) => VehicleAction::Terminate,
+        Action::ReadParameter(name) => VehicleAction::ReadParameter { name: name_from("read_parameter", name)? },
+        Action::ReadParameters(_) => VehicleAction::ReadParameters,
+        Action::SetParameter(set) => VehicleAction::SetParameter {
+            name: name_from("set_parameter.name", set.name)?,
+            value: finite("set_parameter.value", set.value)?,
+            even_in_flight: set.even_in_flight,
+        },
+        Action::DownloadItems(kind) => VehicleAction::DownloadItems { kind: kind_from("download_items", kind)? },
+        Action::UploadItems(upload) => VehicleAction::UploadItems {
+            kind: kind_from("upload_items.kind", upload.kind)?,
+            items: items_from("upload_items.items", upload.items)?,
+        },
+        Action::ClearItems(kind) => VehicleAction::ClearItems { kind: kind_from("clear_items", kind)? },
+        Action::CancelTransfer(_) => VehicleAction::CancelTransfer,
+        Action::ReleasePayload(_) => VehicleAction::ReleasePayload,
+        Action::SecurePayload(_) => VehicleAction::SecurePayload,
     })
 }
 

@@ -8,4 +8,5 @@ mod plan;
 mod sea;
 mod service;
 mod stereo;
+mod transfer;
 mod vehicle;

@@ -89,6 +89,11 @@ fn whoever_is_left_out_of_the_next_order_goes_home() {
     world.run(40.0);
     world.command(MissionAction::Form(order(Shape::Line, &["follower-2", "follower-3"])));
     assert_eq!(world.task("follower-1"), Some(&Task::Return));
+    // Called back on the ground, it may be called again at once.
+    world.run(90.0);
+    world.command(MissionAction::Form(order(Shape::Line, &["follower-1"])));
+    assert!(slot(&world, "follower-1").is_some());
+    world.command(MissionAction::Form(order(Shape::Line, &["follower-2", "follower-3"])));
     assert!(slot(&world, "follower-2").is_some() && slot(&world, "follower-3").is_some());
 }
 
@@ -98,7 +103,8 @@ fn a_mission_of_the_leader_takes_its_follower_from_the_formation_for_good() {
     let followers = ["follower-1", "follower-2", "follower-3"];
     world.create("m", spec(60.0, 0.0));
     world.run_to("m", MissionPhase::Transit, 60.0);
-    world.command(MissionAction::Form(order(Shape::Line, &followers)));
+    // As far apart as the mission's own slot: one of the three stands just where that is, and must make room.
+    world.command(MissionAction::Form(FormationSpec { spacing_m: 7.0, ..order(Shape::Line, &followers) }));
     assert_eq!(world.run_to_end("m", 300.0), MissionPhase::Completed, "{:#?}", world.mission("m").history);
     let sent = world.mission("m").follower.clone().unwrap();
     assert!(world.mission("m").touchdown.unwrap().distance_m(&LocalPoint::new(60.0, 0.0)) < 1.0);

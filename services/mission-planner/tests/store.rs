@@ -5,10 +5,11 @@
 use std::fs;
 use std::path::Path;
 
-use halcyon_mission_planner::core::{Course, Record, Saved};
+use halcyon_mission_planner::core::{Course, Formation, Record, Saved};
 use halcyon_mission_planner::store::{Store, StoreError};
 use halcyon_model::{
-    Approval, Estimate, LocalPoint, Mission, MissionId, MissionPhase, MissionSpec, Stamp, Transition, VehicleId, VerdictState,
+    Approval, Estimate, FormationSpec, LocalPoint, Mission, MissionId, MissionPhase, MissionSpec, Shape, Slot, Stamp,
+    Transition, VehicleId, VerdictState,
 };
 
 fn records() -> (Vec<Record>, Mission, Course) {
@@ -132,8 +133,8 @@ fn a_file_that_cannot_be_trusted_is_refused_and_left_as_it_is() {
     refused(&path("other"), "is not a mission store");
 
     drop(Store::open(&path("newer")).unwrap());
-    rusqlite::Connection::open(path("newer")).unwrap().execute_batch("PRAGMA user_version = 2").unwrap();
-    refused(&path("newer"), "has schema version 2, this build knows 1");
+    rusqlite::Connection::open(path("newer")).unwrap().execute_batch("PRAGMA user_version = 3").unwrap();
+    refused(&path("newer"), "has schema version 3, this build knows 2");
 
     fs::create_dir(path("folder")).unwrap();
     refused(&path("folder"), "could not be opened");
@@ -186,4 +187,50 @@ fn a_store_in_memory_forgets() {
     store.append(&records).unwrap();
     assert_eq!(store.load().unwrap().missions.len(), 1);
     assert_eq!(Store::open(Path::new(":memory:")).unwrap().load().unwrap(), Saved::default());
+}
+
+/// A file of the first version, as the planner of that time made it, goes on with everything in it.
+#[test]
+fn a_store_of_the_first_version_is_taken_over() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("missions.sqlite");
+    let old = rusqlite::Connection::open(&path).unwrap();
+    old.execute_batch(include_str!("../src/store/schema.sql")).unwrap();
+    old.execute_batch(
+        "PRAGMA application_id = 0x48414C43; PRAGMA user_version = 1; INSERT INTO generation (reserved) VALUES (42);",
+    )
+    .unwrap();
+    drop(old);
+    for _ in 0..2 {
+        let store = Store::open(&path).unwrap();
+        assert_eq!(store.load().unwrap(), Saved { generation: 42, ..Saved::default() });
+    }
+}
+
+#[test]
+fn the_last_word_on_a_formation_counts() {
+    let id = |text: &str| VehicleId::new(text).unwrap();
+    let slot = |right_m: f64| Slot { forward_m: -1.0 / 3.0, right_m, up_m: 0.5 };
+    let spec = |leader: &str, followers: Vec<VehicleId>| FormationSpec {
+        leader: id(leader),
+        shape: Shape::Vee,
+        spacing_m: 7.1,
+        followers,
+    };
+    let first =
+        Formation { spec: spec("l-1", vec![id("a"), id("b")]), members: [(id("a"), slot(7.0)), (id("b"), slot(-7.0))].into() };
+    // One of the two that were named has left; the other leader's followers were not named.
+    let left = Formation { members: [(id("b"), slot(-7.0))].into(), ..first.clone() };
+    let other = Formation { spec: spec("l-2", vec![]), members: [(id("c"), slot(1.0))].into() };
+    let ended = Formation { members: [].into(), ..other.clone() };
+    let formed = |formation: &Formation| Record::Formed {
+        formation: formation.clone(),
+        who: "anna".into(),
+        stamp: Stamp::from_nanos(5),
+    };
+    let mut store = Store::open(Path::new(":memory:")).unwrap();
+    store.append(&[formed(&first), formed(&other)]).unwrap();
+    assert_eq!(store.load().unwrap().formations, [first, other.clone()]);
+    store.append(&[formed(&left), formed(&ended)]).unwrap();
+    assert_eq!(store.load().unwrap().formations, [left]);
 }

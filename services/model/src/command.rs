@@ -6,6 +6,7 @@ use crate::id::{MissionId, VehicleId};
 use crate::mission::MissionSpec;
 use crate::plan::Slot;
 use crate::time::Stamp;
+use crate::transfer::{Content, Item, ItemKind, ParameterName};
 use crate::vehicle::FlightMode;
 
 /// The answer to any command.
@@ -19,19 +20,21 @@ pub struct CommandReply {
     pub reason: String,
     /// The mission concerned, for mission commands that were accepted.
     pub mission: Option<MissionId>,
+    /// What was read, for commands that read.
+    pub content: Option<Content>,
 }
 
 impl CommandReply {
     /// Accepted.
     #[must_use]
     pub fn accepted(stamp: Stamp, reason: impl Into<String>) -> Self {
-        Self { stamp, accepted: true, reason: reason.into(), mission: None }
+        Self { stamp, accepted: true, reason: reason.into(), mission: None, content: None }
     }
 
     /// Refused.
     #[must_use]
     pub fn refused(stamp: Stamp, reason: impl Into<String>) -> Self {
-        Self { stamp, accepted: false, reason: reason.into(), mission: None }
+        Self { stamp, accepted: false, reason: reason.into(), mission: None, content: None }
     }
 }
 
@@ -111,6 +114,45 @@ pub enum VehicleAction {
     },
     /// Stop the motors now, in the air or not.
     Terminate,
+    /// Read one parameter of the autopilot.
+    ReadParameter {
+        /// Which.
+        name: ParameterName,
+    },
+    /// Read all of them.
+    ReadParameters,
+    /// Write one, and have it confirmed.
+    SetParameter {
+        /// Which.
+        name: ParameterName,
+        /// Its new value, in the autopilot's unit.
+        value: f64,
+        /// Also while the motors turn: some parameters are dangerous in flight.
+        even_in_flight: bool,
+    },
+    /// Read a list of items.
+    DownloadItems {
+        /// Which.
+        kind: ItemKind,
+    },
+    /// Replace a list of items.
+    UploadItems {
+        /// Which.
+        kind: ItemKind,
+        /// By what; nothing clears it.
+        items: Vec<Item>,
+    },
+    /// Empty a list of items.
+    ClearItems {
+        /// Which.
+        kind: ItemKind,
+    },
+    /// End the transfer under way and those that wait.
+    CancelTransfer,
+    /// Let the payload go. Only on the ground or the water.
+    ReleasePayload,
+    /// Hold the payload: closes what [`Self::ReleasePayload`] opens.
+    SecurePayload,
 }
 
 /// A command to one vehicle.

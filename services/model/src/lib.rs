@@ -23,6 +23,7 @@ pub mod formation;
 pub mod geo;
 pub mod grid_error;
 pub mod id;
+pub mod mav_cmd;
 pub mod mission;
 pub mod plan;
 pub mod rig_yaml;
@@ -30,6 +31,7 @@ pub mod sea;
 pub mod service;
 pub mod stereo;
 pub mod time;
+pub mod transfer;
 pub mod vehicle;
 mod yaml;
 
@@ -50,6 +52,9 @@ pub use stereo::{
     CameraIntrinsics, ElevationGrid, Image, Plane, PoseAtExposure, Preview, RigCalibration, StereoPair, SurfacePatch,
 };
 pub use time::Stamp;
+pub use transfer::{
+    Content, Item, ItemFrame, ItemKind, Parameter, ParameterKind, ParameterName, ParameterNameError,
+};
 pub use vehicle::{
     Activity, Ages, Firmware, Fix, FlightMode, Intent, LandedState, LinkQuality, Range, Role, SimTruth, VehicleState,
 };

@@ -10,6 +10,7 @@ use crate::copter::AirframeConfig;
 use crate::estimator::EstimatorConfig;
 use crate::fault::ScheduledFault;
 use crate::gnss::GnssConfig;
+use crate::rangefinder::RangefinderConfig;
 use crate::rig::RigConfig;
 use crate::sea::SeaConfig;
 use crate::wind::WindConfig;
@@ -40,6 +41,8 @@ pub struct SimConfig {
     pub gnss: GnssConfig,
     /// The vehicles' other sensors and their filter.
     pub estimator: EstimatorConfig,
+    /// The vehicles' rangefinders.
+    pub rangefinder: RangefinderConfig,
     /// The vehicles' batteries.
     pub battery: BatteryConfig,
     /// The vehicles' airframe.
@@ -61,6 +64,7 @@ impl Default for SimConfig {
             wind: WindConfig::default(),
             gnss: GnssConfig::default(),
             estimator: EstimatorConfig::default(),
+            rangefinder: RangefinderConfig::default(),
             battery: BatteryConfig::default(),
             airframe: AirframeConfig::default(),
             vehicles: SimVehicle::fleet(1, 2),
@@ -137,6 +141,7 @@ impl SimConfig {
         self.wind.validate()?;
         self.gnss.validate()?;
         self.estimator.validate()?;
+        self.rangefinder.validate()?;
         self.battery.validate()?;
         self.airframe.validate()?;
         if self.vehicles.len() > VEHICLES_MAX {

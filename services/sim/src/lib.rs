@@ -17,6 +17,7 @@ pub mod estimator;
 pub mod fault;
 pub mod gnss;
 pub mod noise;
+pub mod rangefinder;
 pub mod render;
 pub mod rig;
 pub mod sea;

@@ -1,6 +1,7 @@
 //! One simulated vehicle: airframe, wind, sensors, battery and autopilot, stepped together.
 
 use halcyon_model::{FleetOrigin, LocalPoint, SimTruth, Stamp, VehicleId};
+use mavlink::{MAVLinkMessageRaw, MavlinkVersion};
 use nalgebra::Vector3;
 
 use crate::autopilot::{Autopilot, Inbound, LinkId, Outbound, Sensed};
@@ -9,6 +10,7 @@ use crate::config::SimConfig;
 use crate::copter::{Actuation, Copter, Support};
 use crate::estimator::{Estimate, Estimator};
 use crate::fault::{Fault, ScheduledFault};
+use crate::rangefinder::Rangefinder;
 use crate::wind::Wind;
 
 /// The fixed step of the simulation: 400 a second.
@@ -33,6 +35,7 @@ pub struct Vehicle {
     wind: Wind,
     estimator: Estimator,
     battery: Battery,
+    rangefinder: Option<Rangefinder>,
     autopilot: Autopilot,
     actuation: Actuation,
     wind_ned_mps: Vector3<f64>,
@@ -56,8 +59,10 @@ impl Vehicle {
         let mut estimator = Estimator::new(config.estimator.clone(), config.gnss.clone(), config.seed, name);
         let battery = Battery::new(config.battery.clone());
         let estimate = estimator.step(0.0, copter.motion());
-        let sensed = sense(&copter, &estimator, &battery, estimate);
-        let autopilot = Autopilot::new(
+        let sensed = sense(&copter, &estimator, &battery, None, estimate);
+        let fitted = config.rangefinder.is_fitted(vehicle.role);
+        let rangefinder = fitted.then(|| Rangefinder::new(config.rangefinder.clone(), config.seed, name));
+        let mut autopilot = Autopilot::new(
             config.system_id(index),
             origin.frame(),
             config.airframe.clone(),
@@ -65,6 +70,9 @@ impl Vehicle {
             sensed,
             now,
         );
+        if fitted {
+            autopilot.fit_rangefinder(config.rangefinder.least_m, config.rangefinder.most_m);
+        }
         Some(Self {
             id: vehicle.id.clone(),
             home,
@@ -74,6 +82,7 @@ impl Vehicle {
             wind: Wind::new(config.wind.clone(), config.seed, name),
             estimator,
             battery,
+            rangefinder,
             autopilot,
             actuation: Actuation::OFF,
             wind_ned_mps: Vector3::zeros(),
@@ -126,6 +135,18 @@ impl Vehicle {
         }
     }
 
+    /// Takes a frame from a client, whose signature is looked at when the autopilot signs. Lost while the link is cut.
+    pub fn receive(&mut self, link: LinkId, frame: &MAVLinkMessageRaw) {
+        if !self.link_cut {
+            self.autopilot.receive(self.now, link, frame);
+        }
+    }
+
+    /// Appends what it says on a link to `bytes`, as a frame.
+    pub fn encode(&mut self, link: LinkId, outbound: &Outbound, version: MavlinkVersion, sequence: u8, bytes: &mut Vec<u8>) {
+        self.autopilot.encode(link, outbound, version, sequence, bytes);
+    }
+
     /// What it has to say: to one link, or to all. Nothing while the link is cut.
     pub fn take_outbox(&mut self) -> impl Iterator<Item = (Option<LinkId>, Outbound)> + '_ {
         let cut = self.link_cut;
@@ -155,8 +176,21 @@ impl Vehicle {
         self.copter.step(STEP_S, &actuation, self.wind_ned_mps, support);
         self.battery.step(STEP_S, self.copter.power_w());
         let estimate = self.estimator.step(STEP_S, self.copter.motion());
-        let sensed = sense(&self.copter, &self.estimator, &self.battery, estimate);
+        self.measure_range(elevation);
+        let range_m = self.rangefinder.as_ref().and_then(Rangefinder::measured_m);
+        let sensed = sense(&self.copter, &self.estimator, &self.battery, range_m, estimate);
         self.actuation = self.autopilot.step(self.now, STEP_S, sensed);
+    }
+
+    fn measure_range(&mut self, elevation: Elevation<'_>) {
+        let (home, now) = (self.home, self.now);
+        let surface_m = |place_m: Vector3<f64>| {
+            let place = LocalPoint::from(place_m);
+            if place.distance_m(&home) < JETTY_RADIUS_M { 0.0 } else { elevation(place, now) }
+        };
+        if let Some(rangefinder) = &mut self.rangefinder {
+            rangefinder.step(STEP_S, self.copter.motion(), surface_m);
+        }
     }
 
     fn support(&mut self, elevation: Elevation<'_>) -> Option<Support> {
@@ -236,7 +270,7 @@ impl Vehicle {
     }
 }
 
-fn sense(copter: &Copter, estimator: &Estimator, battery: &Battery, estimate: Estimate) -> Sensed {
+fn sense(copter: &Copter, estimator: &Estimator, battery: &Battery, range_m: Option<f64>, estimate: Estimate) -> Sensed {
     let gnss = estimator.gnss();
     Sensed {
         estimate,
@@ -249,6 +283,7 @@ fn sense(copter: &Copter, estimator: &Estimator, battery: &Battery, estimate: Es
         battery_fraction: battery.fraction(),
         battery_ah: (battery.remaining_ah(), battery.drawn_ah()),
         battery_wh: battery.drawn_wh(),
+        range_m,
         simulator: *copter.motion(),
     }
 }

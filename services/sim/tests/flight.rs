@@ -2,179 +2,18 @@
 #![allow(deprecated, reason = "ArduPilot still speaks much that MAVLink has deprecated")]
 #![allow(clippy::expect_used, reason = "a test without its vehicle cannot go on")]
 
-use halcyon_model::{FleetOrigin, Geodetic, LocalPoint, Stamp};
-use halcyon_sim::autopilot::{Inbound, LinkId, Mode, Outbound};
+mod field;
+
+use field::{Field, LINK, POSITION, VELOCITY, perfect, real};
+use halcyon_model::Stamp;
+use halcyon_sim::SimConfig;
+use halcyon_sim::autopilot::{Inbound, Mode};
 use halcyon_sim::copter::AirframeConfig;
-use halcyon_sim::estimator::EstimatorConfig;
 use halcyon_sim::fault::Fault;
-use halcyon_sim::gnss::GnssConfig;
-use halcyon_sim::vehicle::Vehicle;
 use halcyon_sim::wind::WindConfig;
-use halcyon_sim::{SimConfig, SimVehicle};
 use mavlink::MavHeader;
 use mavlink::dialects::ardupilotmega as mav;
 use mavlink::dialects::ardupilotmega::{MavCmd, MavMessage, MavResult};
-
-const LINK: LinkId = LinkId(1);
-/// Position only; velocity only.
-const POSITION: u16 = 0b1101_1111_1000;
-const VELOCITY: u16 = 0b1101_1100_0111;
-
-struct Field {
-    vehicle: Vehicle,
-    water: Box<dyn Fn(LocalPoint, Stamp) -> f64>,
-    heard: Vec<MavMessage>,
-    unsupported: usize,
-}
-
-impl Field {
-    fn new(config: &SimConfig) -> Self {
-        let origin = FleetOrigin(Geodetic::from_deg(53.1, -2.9, 40.0));
-        let mut vehicle = Vehicle::new(config, 0, origin, Stamp::from_nanos(1_760_000_000_000_000_000)).expect("a vehicle");
-        assert!(vehicle.attach(LINK));
-        Self { vehicle, water: Box::new(|_, _| 0.0), heard: Vec::new(), unsupported: 0 }
-    }
-
-    fn say(&mut self, message: MavMessage) {
-        self.vehicle.handle(LINK, &Inbound::Message(MavHeader { system_id: 255, component_id: 190, sequence: 0 }, message));
-        self.listen();
-    }
-
-    fn listen(&mut self) {
-        for (_, outbound) in self.vehicle.take_outbox() {
-            match outbound {
-                Outbound::Message(message) => self.heard.push(message),
-                Outbound::Unsupported(_) => self.unsupported += 1,
-            }
-        }
-    }
-
-    fn run(&mut self, seconds: f64) {
-        let until = self.vehicle.now().plus_secs_f64(seconds + 1e-4);
-        while self.vehicle.now().plus_secs_f64(0.0025) < until {
-            self.vehicle.advance(self.vehicle.now().plus_secs_f64(0.01), &*self.water);
-            self.listen();
-        }
-    }
-
-    /// Runs until `done`, and returns after how many seconds.
-    #[track_caller]
-    fn until(&mut self, seconds_max: f64, what: &str, done: impl Fn(&Vehicle) -> bool) -> f64 {
-        let mut seconds = 0.0;
-        while !done(&self.vehicle) {
-            assert!(seconds < seconds_max, "{what}: not after {seconds_max} s; {:?}; {:?}", self.vehicle.truth(), self.texts());
-            self.run(0.05);
-            seconds += 0.05;
-        }
-        seconds
-    }
-
-    fn command(&mut self, command: MavCmd, params: [f32; 7]) -> MavResult {
-        self.heard.retain(|message| !matches!(message, MavMessage::COMMAND_ACK(_)));
-        let [param1, param2, param3, param4, param5, param6, param7] = params;
-        self.say(MavMessage::COMMAND_LONG(mav::COMMAND_LONG_DATA {
-            param1,
-            param2,
-            param3,
-            param4,
-            param5,
-            param6,
-            param7,
-            command,
-            target_system: 1,
-            target_component: 1,
-            confirmation: 0,
-        }));
-        let acks: Vec<_> = self
-            .heard
-            .iter()
-            .filter_map(|message| match message {
-                MavMessage::COMMAND_ACK(ack) if ack.command == command => Some(ack.result),
-                _ => None,
-            })
-            .collect();
-        assert_eq!(acks.len(), 1, "exactly one answer to {command:?}");
-        acks[0]
-    }
-
-    fn set_mode(&mut self, mode: Mode) -> MavResult {
-        self.command(MavCmd::MAV_CMD_DO_SET_MODE, [1.0, mode.number() as f32, 0.0, 0.0, 0.0, 0.0, 0.0])
-    }
-
-    fn arm(&mut self) -> MavResult {
-        self.command(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-    }
-
-    fn set_param(&mut self, name: &str, param_value: f32) {
-        self.say(MavMessage::PARAM_SET(mav::PARAM_SET_DATA {
-            param_value,
-            target_system: 1,
-            target_component: 1,
-            param_id: name.into(),
-            param_type: mav::MavParamType::MAV_PARAM_TYPE_REAL32,
-        }));
-    }
-
-    fn target(&mut self, mask: u16, position: [f32; 3], velocity: [f32; 3]) {
-        self.say(MavMessage::SET_POSITION_TARGET_LOCAL_NED(mav::SET_POSITION_TARGET_LOCAL_NED_DATA {
-            x: position[0],
-            y: position[1],
-            z: position[2],
-            vx: velocity[0],
-            vy: velocity[1],
-            vz: velocity[2],
-            type_mask: mav::PositionTargetTypemask::from_bits_retain(mask),
-            target_system: 1,
-            target_component: 1,
-            coordinate_frame: mav::MavFrame::MAV_FRAME_LOCAL_NED,
-            ..Default::default()
-        }));
-    }
-
-    fn texts(&self) -> Vec<String> {
-        let text = |message: &MavMessage| match message {
-            MavMessage::STATUSTEXT(data) => data.text.to_str().ok().map(str::to_owned),
-            _ => None,
-        };
-        self.heard.iter().filter_map(text).collect()
-    }
-
-    fn heard_text(&self, part: &str) -> bool {
-        self.texts().iter().any(|text| text.contains(part))
-    }
-
-    /// Ready, GUIDED, armed, and up at `height_m`.
-    fn take_off(&mut self, height_m: f32) {
-        while self.arm_when_ready() != MavResult::MAV_RESULT_ACCEPTED {
-            self.run(0.5);
-        }
-        let up = self.command(MavCmd::MAV_CMD_NAV_TAKEOFF, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, height_m]);
-        assert_eq!(up, MavResult::MAV_RESULT_ACCEPTED);
-        let wanted_m = -f64::from(height_m);
-        self.until(30.0, "take-off", |vehicle| (vehicle.truth().position_ned_m.z - wanted_m).abs() < 0.4);
-        self.run(4.0);
-    }
-
-    fn arm_when_ready(&mut self) -> MavResult {
-        assert!(self.vehicle.truth().stamp.as_nanos() < 1_760_000_060_000_000_000, "never ready: {:?}", self.texts());
-        self.set_mode(Mode::Guided);
-        self.arm()
-    }
-}
-
-fn perfect() -> SimConfig {
-    SimConfig {
-        wind: WindConfig::calm(),
-        gnss: GnssConfig::perfect(),
-        estimator: EstimatorConfig::perfect(),
-        vehicles: SimVehicle::fleet(1, 0),
-        ..SimConfig::default()
-    }
-}
-
-fn real() -> SimConfig {
-    SimConfig { vehicles: SimVehicle::fleet(1, 0), ..SimConfig::default() }
-}
 
 #[test]
 fn nothing_but_heartbeats_and_texts_comes_unasked() {
@@ -187,6 +26,7 @@ fn nothing_but_heartbeats_and_texts_comes_unasked() {
                 | MavMessage::STATUSTEXT(_)
                 | MavMessage::HOME_POSITION(_)
                 | MavMessage::GPS_GLOBAL_ORIGIN(_)
+                | MavMessage::TIMESYNC(_)
         )
     });
     assert_eq!(unasked.count(), 0);
@@ -245,7 +85,7 @@ fn commands_are_answered_as_ardupilot_does() {
     field.vehicle.handle(LINK, &Inbound::UnknownCommand { header, command: 64_000, target_system: 1 });
     field.vehicle.handle(LINK, &Inbound::UnknownCommand { header, command: 64_000, target_system: 2 });
     field.listen();
-    assert_eq!(field.unsupported, 1);
+    assert_eq!(field.unlisted, [(64_000, MavResult::MAV_RESULT_UNSUPPORTED as u8)]);
 }
 
 #[test]
@@ -317,6 +157,27 @@ fn on_the_ground_a_target_lifts_nothing_and_nonsense_is_ignored() {
 }
 
 #[test]
+fn a_target_ends_a_take_off() {
+    let mut field = Field::new(&perfect());
+    field.run(3.0);
+    field.set_mode(Mode::Guided);
+    assert_eq!(field.arm(), MavResult::MAV_RESULT_ACCEPTED);
+    let up = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 8.0];
+    assert_eq!(field.command(MavCmd::MAV_CMD_NAV_TAKEOFF, up), MavResult::MAV_RESULT_ACCEPTED);
+    // Before it has lifted off: it stays on the ground.
+    field.target(POSITION, [0.0, 0.0, -8.0], [0.0; 3]);
+    field.run(3.0);
+    assert!(field.vehicle.truth().position_ned_m.z > -0.05);
+    // On the way up: it goes there instead.
+    assert_eq!(field.command(MavCmd::MAV_CMD_NAV_TAKEOFF, up), MavResult::MAV_RESULT_ACCEPTED);
+    field.until(10.0, "lift-off", |vehicle| vehicle.truth().position_ned_m.z < -2.0);
+    field.target(POSITION, [6.0, 0.0, -4.0], [0.0; 3]);
+    field.run(10.0);
+    let off_m = field.vehicle.truth().position_ned_m - nalgebra::Vector3::new(6.0, 0.0, -4.0);
+    assert!(off_m.norm() < 0.2, "{off_m}");
+}
+
+#[test]
 fn land_touches_down_gently_and_disarms() {
     let mut field = Field::new(&real());
     field.take_off(5.0);
@@ -351,6 +212,25 @@ fn it_lands_on_waves_and_floats_with_them() {
         let draft_m = truth.position_ned_m.z + wave(truth.stamp);
         assert!((0.0..0.15).contains(&draft_m), "{draft_m}");
     }
+}
+
+/// As ArduCopter's: it wants less than 1 m/s² below 1 Hz for a second, and short steep waves throw it about by more than that.
+#[test]
+fn steep_waves_keep_the_land_detector_waiting() {
+    let mut field = Field::new(&real());
+    field.take_off(5.0);
+    let wave = |stamp: Stamp| 0.25 * (std::f64::consts::TAU * (stamp.as_nanos() % 2_000_000_000) as f64 / 2e9).sin();
+    field.water = Box::new(move |_, stamp| wave(stamp));
+    field.target(POSITION, [20.0, 0.0, -5.0], [0.0; 3]);
+    field.run(15.0);
+    field.set_mode(Mode::Land);
+    field.until(40.0, "touchdown", |vehicle| vehicle.truth().landed);
+    field.run(30.0);
+    assert!(field.vehicle.autopilot().is_armed() && !field.vehicle.autopilot().is_landed());
+    // Only by force, as for any vehicle in the air.
+    let [disarm, force] = [0.0, 21_196.0].map(|magic| [0.0, magic, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    assert_eq!(field.command(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, disarm), MavResult::MAV_RESULT_FAILED);
+    assert_eq!(field.command(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, force), MavResult::MAV_RESULT_ACCEPTED);
 }
 
 #[test]

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use anyhow::bail;
 use halcyon_chassis::{Context, EventDraft, Incoming, Publisher, topics};
-use halcyon_model::{CommandReply, Stamp, VehicleCommand, VehicleId, VehicleState};
+use halcyon_model::{CommandReply, Stamp, VehicleAction, VehicleCommand, VehicleId, VehicleState};
 use tracing::{debug, info, trace, warn};
 
 use crate::autopilot::Autopilot;
@@ -17,12 +17,15 @@ use crate::config::Config;
 use crate::core::commands::{Command, CommandError, Effect, Ticket};
 use crate::core::encode;
 use crate::core::executor::{Decision, Executor, ExecutorConfig, Output, PlanAnswer, word};
+use crate::core::transfers::Ending;
 use crate::io::link::{Link, LinkEvent};
 
 /// Commands that wait for the autopilot's answer at once; more are refused.
 const WAITING_MAX: usize = 16;
 /// However often a leader speaks, guidance steps no more often than this, seconds.
 const STEP_S_MIN: f64 = 0.02;
+/// People are told how far a long transfer is this often, seconds.
+const TELL_S: f64 = 5.0;
 
 /// Runs until `context.stop`.
 ///
@@ -57,7 +60,7 @@ pub async fn run(context: Context, config: Config) -> anyhow::Result<()> {
                 }
             }
             state = others.recv() => service.neighbour(state?, &link).await,
-            incoming = commands.recv() => service.command(incoming?).await,
+            incoming = commands.recv() => service.command(incoming?, &link).await,
             now = guidance.tick() => service.step(now, &link).await,
             now = publishing.tick() => service.publish(now).await?,
             _ = heartbeat.tick() => link.send(service.autopilot.header(), encode::heartbeat()),
@@ -76,6 +79,7 @@ struct Service<'a> {
     link_problem: Option<String>,
     published: Option<Stamp>,
     stepped: Option<Stamp>,
+    told: Option<Stamp>,
 }
 
 impl<'a> Service<'a> {
@@ -85,6 +89,7 @@ impl<'a> Service<'a> {
             limits: config.limits.clone(),
             fail_safe: config.fail_safe.clone(),
             guidance: config.guidance.clone(),
+            payload: config.payload.clone(),
             home_height_m: config.home_height_m,
             frame: context.origin.frame(),
         });
@@ -101,6 +106,7 @@ impl<'a> Service<'a> {
             link_problem,
             published: None,
             stepped: None,
+            told: None,
         })
     }
 
@@ -130,6 +136,10 @@ impl<'a> Service<'a> {
                 if let Some(text) = heard.text {
                     info!(vehicle = %self.vehicle, "autopilot: {text}");
                     self.executor.observe_text(&text, now);
+                }
+                if heard.transfer {
+                    let effects = self.autopilot.poll_transfers(now);
+                    self.carry_out(effects, link).await;
                 }
                 if heard.state
                     && let Some((state, mode_heard)) = self.autopilot.state(now)
@@ -176,6 +186,7 @@ impl<'a> Service<'a> {
         }
         let effects = self.autopilot.poll(now);
         self.carry_out(effects, link).await;
+        self.tell_progress(now).await;
         self.report();
     }
 
@@ -186,6 +197,11 @@ impl<'a> Service<'a> {
                 Effect::Done(_, Command::SetInterval(stream), outcome) => {
                     if let Err(error) = outcome {
                         debug!(message_id = stream.message_id, %error, "stream not set");
+                    }
+                }
+                Effect::Transferred(ticket, ending) => {
+                    if let Some(incoming) = self.waiting.remove(&ticket) {
+                        self.answer_transfer(incoming, ending, self.context.clock.now()).await;
                     }
                 }
                 Effect::Done(ticket, command, outcome) => {
@@ -207,13 +223,70 @@ impl<'a> Service<'a> {
         incoming.reply(&reply).await;
     }
 
-    async fn command(&mut self, incoming: Incoming<VehicleCommand>) {
+    /// Whatever was written is told to people.
+    async fn answer_transfer(&self, incoming: Incoming<VehicleCommand>, ending: Ending, now: Stamp) {
+        let who = incoming.command.who.clone();
+        let reads = matches!(
+            incoming.command.action,
+            VehicleAction::ReadParameter { .. } | VehicleAction::ReadParameters | VehicleAction::DownloadItems { .. }
+        );
+        let reply = match ending {
+            Ok(done) => CommandReply { content: done.content, ..CommandReply::accepted(now, done.what) },
+            Err(error) => CommandReply::refused(now, error.to_string()),
+        };
+        if !reads {
+            let why = format!("for {who}");
+            let event = if reply.accepted {
+                EventDraft::info(reply.reason.clone(), why)
+            } else {
+                EventDraft::warning(format!("transfer failed: {}", reply.reason), why)
+            };
+            self.event(event).await;
+        }
+        incoming.reply(&reply).await;
+    }
+
+    /// Says every few seconds how far a long transfer is.
+    async fn tell_progress(&mut self, now: Stamp) {
+        let Some((what, since, done, total)) = self.autopilot.transferring() else {
+            self.told = None;
+            return;
+        };
+        if now.seconds_since(self.told.unwrap_or(since).max(since)) >= TELL_S {
+            let draft = EventDraft::info(what.to_owned(), format!("{done} of {total}"));
+            self.told = Some(now);
+            self.event(draft).await;
+        }
+    }
+
+    async fn command(&mut self, incoming: Incoming<VehicleCommand>, link: &Link) {
         let now = self.context.clock.now();
         let reply = match self.executor.command(&incoming.command, now) {
             Decision::Accepted(what) => CommandReply::accepted(now, what),
             Decision::Refused(why) => {
                 warn!(vehicle = %self.vehicle, who = incoming.command.who, why, "command refused");
                 CommandReply::refused(now, why)
+            }
+            Decision::CancelTransfers => {
+                let (count, ended) = self.autopilot.cancel_transfers();
+                self.carry_out(ended, link).await;
+                CommandReply::accepted(now, format!("{count} transfers cancelled"))
+            }
+            Decision::Transfer(_) if self.waiting.len() >= WAITING_MAX => {
+                CommandReply::refused(now, CommandError::Busy.to_string())
+            }
+            Decision::Transfer(request) => {
+                let ticket = self.next_ticket;
+                self.next_ticket += 1;
+                match self.autopilot.transfer(ticket, request, incoming.command.deadline) {
+                    Ok(()) => {
+                        self.waiting.insert(ticket, incoming);
+                        let effects = self.autopilot.poll_transfers(now);
+                        self.carry_out(effects, link).await;
+                        return;
+                    }
+                    Err(error) => CommandReply::refused(now, error.to_string()),
+                }
             }
             // A termination waits for no place.
             Decision::Ask(command) if self.waiting.len() >= WAITING_MAX && command != (Command::Disarm { force: true }) => {

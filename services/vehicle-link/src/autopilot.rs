@@ -13,6 +13,7 @@ use crate::core::local::LocalFinder;
 use crate::core::streams::Streams;
 use crate::core::telemetry::Telemetry;
 use crate::core::text::Texts;
+use crate::core::transfers::{Request, TransferError, Transfers};
 
 /// MAV_COMP_ID_ONBOARD_COMPUTER.
 const OWN_COMPONENT: u8 = 191;
@@ -30,6 +31,8 @@ pub struct Heard {
     pub text: Option<String>,
     /// This is the first time that the autopilot was heard.
     pub found: Option<u8>,
+    /// A transfer may have something to answer: [`Autopilot::poll_transfers`].
+    pub transfer: bool,
 }
 
 /// The autopilot of one vehicle.
@@ -43,6 +46,7 @@ pub struct Autopilot {
     streams: Streams,
     texts: Texts,
     commands: Commands,
+    transfers: Transfers,
     started: Stamp,
 }
 
@@ -63,6 +67,7 @@ impl Autopilot {
             streams: Streams::default(),
             texts: Texts::default(),
             commands: Commands::default(),
+            transfers: Transfers::default(),
             started: now,
         })
     }
@@ -87,6 +92,7 @@ impl Autopilot {
         }
         self.streams.observe(message.message_id(), now);
         self.local.observe(message, &self.datum, now);
+        heard.transfer = self.transfers.observe(message, (system, OWN_COMPONENT), now);
         match message {
             MavMessage::STATUSTEXT(data) => heard.text = self.texts.observe(data, now).map(|text| text.text.clone()),
             MavMessage::COMMAND_ACK(data) => self.commands.observe_ack(data, system, OWN_COMPONENT, now),
@@ -127,7 +133,7 @@ impl Autopilot {
 
     /// Stops asking for anything that moves the vehicle.
     pub fn withdraw(&mut self) -> Vec<Effect> {
-        self.commands.withdraw(self.telemetry.mode())
+        self.commands.withdraw(self.address, self.telemetry.mode())
     }
 
     /// The connection was lost: whoever answers next may be another program, or the autopilot after a restart.
@@ -135,7 +141,36 @@ impl Autopilot {
         self.address = None;
         self.local = LocalFinder::default();
         self.streams = Streams::default();
-        self.commands.abandon()
+        let mut ended = self.commands.abandon();
+        ended.extend(self.transfers.abandon());
+        ended
+    }
+
+    /// Puts a transfer in line; it ends at `deadline`.
+    ///
+    /// # Errors
+    /// [`TransferError::NotHeard`], or as [`Transfers::submit`].
+    pub fn transfer(&mut self, ticket: Ticket, request: Request, deadline: Stamp) -> Result<(), TransferError> {
+        if self.address.is_none() {
+            return Err(TransferError::NotHeard);
+        }
+        self.transfers.submit(ticket, request, deadline)
+    }
+
+    /// What a transfer has to send or to tell now.
+    pub fn poll_transfers(&mut self, now: Stamp) -> Vec<Effect> {
+        self.address.map_or_else(Vec::new, |address| self.transfers.poll(address, now))
+    }
+
+    /// Ends the transfers; returns how many there were.
+    pub fn cancel_transfers(&mut self) -> (usize, Vec<Effect>) {
+        self.transfers.cancel(self.address)
+    }
+
+    /// What is being transferred, since when, and how much of how much is done.
+    #[must_use]
+    pub fn transferring(&self) -> Option<(&str, Stamp, usize, usize)> {
+        self.transfers.progress()
     }
 
     /// The autopilot started again: its streams are asked for afresh, and its local frame is another.
@@ -151,7 +186,9 @@ impl Autopilot {
             // A full line is tried again with the next retry of the stream.
             let _ = self.commands.submit(0, Command::SetInterval(stream));
         }
-        self.commands.poll(address, &self.texts, now)
+        let mut effects = self.commands.poll(address, &self.texts, now);
+        effects.extend(self.transfers.poll(address, now));
+        effects
     }
 
     /// A setpoint for the autopilot; `None` before it was heard, or if a number is not finite.

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::core::guidance::Guidance;
 use crate::core::limits::{FailSafeLimits, Limits};
+use crate::core::payload::Payload;
 
 /// One vehicle and the link to its autopilot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -32,6 +33,8 @@ pub struct Config {
     pub fail_safe: FailSafeLimits,
     /// How slots are kept.
     pub guidance: Guidance,
+    /// What holds the payload, and when it is let go.
+    pub payload: Payload,
 }
 
 impl Default for Config {
@@ -47,6 +50,7 @@ impl Default for Config {
             limits: Limits::default(),
             fail_safe: FailSafeLimits::default(),
             guidance: Guidance::default(),
+            payload: Payload::default(),
         }
     }
 }
@@ -83,6 +87,7 @@ impl Section for Config {
         self.limits.validate()?;
         self.fail_safe.validate()?;
         self.guidance.loops.validate()?;
+        self.payload.validate()?;
         let (fence_m, safe_m) = (self.fail_safe.fence_height_m, self.limits.safe_height_m.max(self.limits.return_height_m));
         if fence_m < safe_m + 2.0 {
             return Err(format!(

@@ -8,6 +8,8 @@
 //! |---|---|
 //! | [`core::telemetry`] | MAVLink messages → vehicle state |
 //! | [`core::commands`] | the command protocol: retries, acknowledgements, typed refusals |
+//! | [`core::transfers`], [`core::parameters`], [`core::items`] | parameters; missions, fences, rally points |
+//! | [`core::payload`] | what holds the payload |
 //! | [`core::guidance`], [`core::separation`], [`core::track`] | the slot, the way there, the distance to everyone |
 //! | [`core::law`], [`core::observer`], [`core::inverse`] | the named laws, the leader's motion, the follower's own lag |
 //! | [`core::local`] | the autopilot's local frame, the only one in which it takes accelerations |

@@ -4,14 +4,15 @@ use std::time::Duration;
 
 use anyhow::Context as _;
 use halcyon_chassis::{Context, EventDraft, topics};
-use halcyon_model::{RigId, SeaState, VerdictState};
+use halcyon_model::{RigId, SeaState, VehicleId, VerdictState};
 use metrics::{counter, gauge};
+use tokio::task::{JoinError, JoinHandle, spawn_blocking};
 use tracing::{trace, warn};
 
 use crate::config::Config;
-use crate::core::{Assessor, PatchError};
+use crate::core::{Around, Assessor, Glance, PatchError};
 
-/// How often silence is looked for.
+/// How often silence is looked for, and whether it is time to look around.
 const TICK: Duration = Duration::from_millis(500);
 
 /// Assesses one rig's patches until told to stop.
@@ -22,11 +23,16 @@ const TICK: Duration = Duration::from_millis(500);
 /// If the configuration has no valid rig, or the bus is gone.
 pub async fn run(context: Context, config: Config) -> anyhow::Result<()> {
     let rig = RigId::new(&config.rig).context("rig")?;
+    let vehicle = VehicleId::new(&config.rig).context("rig")?;
     let mut assessor = Assessor::new(config)?;
     let mut patches = context.bus.subscribe(&topics::surface(&rig)).await?;
+    // A rig is called after the vehicle that carries it; a fixed one has none, and nobody speaks.
+    let mut vehicle_states = context.bus.subscribe(&topics::vehicle_state(&vehicle)).await?;
     let sea_states = context.bus.publisher(&topics::sea_state(&rig)).await?;
     let mut ticker = context.clock.every(TICK);
     let mut shell = Shell { context: &context, rig: &rig, verdict: None };
+    // One look around at a time, beside the patches: it takes a hundred times as long as one of them.
+    let mut looking: Option<JoinHandle<Around>> = None;
     context.health.ready("waiting for surface patches");
     loop {
         let sea_state = tokio::select! {
@@ -41,7 +47,18 @@ pub async fn run(context: Context, config: Config) -> anyhow::Result<()> {
                     }
                 }
             }
+            state = vehicle_states.recv() => {
+                assessor.hear(&state?, context.clock.now());
+                None
+            }
+            around = finished(&mut looking) => {
+                assessor.notice(around.context("look around")?);
+                None
+            }
             now = ticker.tick() => {
+                if looking.is_none() {
+                    looking = assessor.glance().map(|glance: Glance| spawn_blocking(|| glance.look()));
+                }
                 if let Some(silent_s) = assessor.silent_s(now) {
                     gauge!("assessment_patch_age_seconds").set(silent_s);
                 }
@@ -53,6 +70,16 @@ pub async fn run(context: Context, config: Config) -> anyhow::Result<()> {
             shell.tell(&sea_state).await;
         }
     }
+}
+
+/// What a look around found, once it is done; never without one.
+async fn finished(looking: &mut Option<JoinHandle<Around>>) -> Result<Around, JoinError> {
+    let found = match looking {
+        Some(handle) => handle.await,
+        None => std::future::pending().await,
+    };
+    *looking = None;
+    found
 }
 
 /// Counts and logs a patch that was not used; it costs nothing else.

@@ -108,11 +108,47 @@ fn it_takes_its_time() {
     }
 }
 
+/// The sea state of all of `patches`, with a look around.
+fn concluded(patches: &[SurfacePatch]) -> SeaState {
+    let mut assessor = assessor(|_| {});
+    assess(&mut assessor, patches);
+    assessor.conclude(patches.last().unwrap().stamp.plus_secs_f64(0.1)).unwrap()
+}
+
+/// What a glance finds is shown with the sea states that follow, for as long as it is fresh, and not once the clock was set back.
+#[test]
+fn looks_are_taken_apart() {
+    let patches = Camera::default().film(&Sea::jonswap(0.06, 1.5, 1), 400);
+    let mut assessor = assessor(|_| {});
+    assert!(assessor.glance().is_none(), "there is nothing to see");
+    let before = assess(&mut assessor, &patches[..301]);
+    assert!(before.iter().all(|state| state.directional.is_none() && state.calm.is_none()), "nobody looked");
+    let found = assessor.glance().unwrap().look();
+    // A second of patches on: the look was of then.
+    assert!(assess(&mut assessor, &patches[301..306])[0].calm.is_none());
+    assessor.notice(found.clone());
+    assert!(assessor.glance().is_some(), "a second on, quiet moments are looked for again");
+    let after = assess(&mut assessor, &patches[306..]);
+    assert!(after[0].directional.is_some() && after[0].calm.as_ref().is_some_and(|calm| calm.from == patches[300].stamp));
+    assert!(after.last().unwrap().calm.is_none(), "quiet moments of long ago are none");
+    assert!(after.last().unwrap().directional.is_some(), "directions keep");
+    assessor.look_around();
+    assert!(assessor.glance().is_none(), "just looked");
+
+    let mut again = patches[0].clone();
+    again.stamp = start().plus_secs_f64(-3600.0);
+    assessor.observe(&again, again.stamp).unwrap();
+    assessor.notice(found);
+    again.stamp = again.stamp.plus_secs_f64(1.0);
+    let anew = assessor.observe(&again, again.stamp).unwrap().unwrap();
+    assert_eq!((anew.directional, anew.calm), (None, None));
+}
+
 /// The sea travels towards 60°, and so comes from 240°; its peak is as long as dispersion has it.
 #[test]
 fn directions_and_quiet_moments_are_told() {
     for seed in 0..3 {
-        let found = last(|_| {}, &Camera::default().film(&Sea::jonswap(0.06, 1.5, seed), 301));
+        let found = concluded(&Camera::default().film(&Sea::jonswap(0.06, 1.5, seed), 301));
         let found_from = found.directional.unwrap();
         let off_deg = found_from.from_rad.value.to_degrees() - 240.0;
         assert!(off_deg.abs() < 12.0, "{off_deg}° off: {found_from:?}");
@@ -126,7 +162,7 @@ fn directions_and_quiet_moments_are_told() {
         assert!(found.spectrum.is_some_and(|s| s.factors_95[0] < 1.0 && s.factors_95[1] > 1.0));
     }
     // Still water comes from nowhere.
-    let still = last(|_| {}, &Camera::default().film(&Sea::default(), 301));
+    let still = concluded(&Camera::default().film(&Sea::default(), 301));
     assert_eq!((still.directional, still.calm, still.spectrum), (None, None, None));
 }
 

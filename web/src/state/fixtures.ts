@@ -15,6 +15,8 @@ export const vehicle = (over: Partial<Vehicle> = {}): Vehicle => ({
   heading_deg: 0, roll_deg: 0, pitch_deg: 0, mode: 'GUIDED', armed: true, landed: 'in_air', battery_percent: 80, battery_v: 15.2,
   fix: { kind: '3d', satellites: 14, horizontal_sigma_m: 0.8 }, estimator_ok: true, ready_to_arm: true, boot_s: 100,
   activity: { kind: 'holding', settled: true, slot_error_m: null, reason: null }, plan_generation: 3, home: null, touchdown: null,
+  acceleration: null, range_m: null, link: null, firmware: null,
+  ages: { mode_s: 0.1, attitude_s: 0.1, landed_s: 0.1, battery_s: 0.5, fix_s: 0.2, estimator_s: 0.2, home_s: 1 },
   ...over,
 });
 

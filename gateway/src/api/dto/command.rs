@@ -77,6 +77,12 @@ pub enum VehicleCommandRequest {
     },
     /// Stop the motors now, in the air or not.
     Terminate,
+    /// Let the payload go. Only on the ground or the water.
+    ReleasePayload,
+    /// Hold the payload.
+    SecurePayload,
+    /// End the transfer of parameters or items that is under way, and those that wait.
+    CancelTransfer,
 }
 
 /// The answer to an accepted command. It is being carried out; watch `watch`, or the live stream, to see it done.

@@ -208,6 +208,93 @@ pub struct VelocityNed {
     pub down_mps: f64,
 }
 
+/// The link between a vehicle's computer and its autopilot.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct LinkQuality {
+    /// Share of the autopilot's messages lost lately, percent.
+    pub loss_percent: f64,
+    /// There and back, milliseconds; `null` if not measured.
+    #[schema(required = true)]
+    pub round_trip_ms: Option<f64>,
+    /// Messages since the link was opened.
+    pub received: u64,
+    /// They are signed with the fleet's key.
+    pub signed: bool,
+}
+
+impl From<model::LinkQuality> for LinkQuality {
+    fn from(link: model::LinkQuality) -> Self {
+        Self {
+            loss_percent: 100.0 * link.loss,
+            round_trip_ms: link.round_trip_s.map(|round_trip_s| 1000.0 * round_trip_s),
+            received: link.received,
+            signed: link.is_signed,
+        }
+    }
+}
+
+/// What flies a vehicle.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct Firmware {
+    /// Such as `ArduPilot`.
+    pub autopilot: String,
+    /// Such as `quadrotor`.
+    pub vehicle: String,
+    /// Such as `4.6.0`; empty if it does not say.
+    pub version: String,
+}
+
+impl From<&model::Firmware> for Firmware {
+    fn from(firmware: &model::Firmware) -> Self {
+        let model::Firmware { autopilot, vehicle, version } = firmware.clone();
+        Self { autopilot, vehicle, version }
+    }
+}
+
+/// Seconds since each part of the state was heard when it was sent; `null` if never.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Ages {
+    /// Flight mode.
+    #[schema(required = true)]
+    pub mode_s: Option<f64>,
+    /// Attitude.
+    #[schema(required = true)]
+    pub attitude_s: Option<f64>,
+    /// Landed or not.
+    #[schema(required = true)]
+    pub landed_s: Option<f64>,
+    /// Battery.
+    #[schema(required = true)]
+    pub battery_s: Option<f64>,
+    /// GNSS.
+    #[schema(required = true)]
+    pub fix_s: Option<f64>,
+    /// The estimator's health.
+    #[schema(required = true)]
+    pub estimator_s: Option<f64>,
+    /// Home.
+    #[schema(required = true)]
+    pub home_s: Option<f64>,
+}
+
+impl From<model::Ages> for Ages {
+    fn from(ages: model::Ages) -> Self {
+        let model::Ages { mode_s, attitude_s, landed_s, battery_s, fix_s, estimator_s, home_s } = ages;
+        Self { mode_s, attitude_s, landed_s, battery_s, fix_s, estimator_s, home_s }
+    }
+}
+
+/// Acceleration without gravity.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct AccelerationNed {
+    /// Metres per second squared northwards.
+    pub north_mps2: f64,
+    /// Metres per second squared eastwards.
+    pub east_mps2: f64,
+    /// Metres per second squared downwards.
+    pub down_mps2: f64,
+}
+
 /// A vehicle, as it last said.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Vehicle {
@@ -264,6 +351,20 @@ pub struct Vehicle {
     /// Where it touched down for its last landing task, by its own position.
     #[schema(required = true)]
     pub touchdown: Option<Point>,
+    /// Acceleration; `null` if not measured.
+    #[schema(required = true)]
+    pub acceleration: Option<AccelerationNed>,
+    /// Downward rangefinder, metres along the body's down axis; `null` without one, or out of its range.
+    #[schema(required = true)]
+    pub range_m: Option<f64>,
+    /// How old each part of this is.
+    pub ages: Ages,
+    /// The link to the autopilot; `null` until something was heard.
+    #[schema(required = true)]
+    pub link: Option<LinkQuality>,
+    /// What flies it; `null` until it says.
+    #[schema(required = true)]
+    pub firmware: Option<Firmware>,
 }
 
 impl Vehicle {
@@ -297,6 +398,15 @@ impl Vehicle {
             plan_generation: state.plan_generation,
             home: state.home.map(Into::into),
             touchdown: state.touchdown.map(|point| edge.point(point)),
+            acceleration: state.acceleration_ned_mps2.map(|acceleration| AccelerationNed {
+                north_mps2: acceleration.x,
+                east_mps2: acceleration.y,
+                down_mps2: acceleration.z,
+            }),
+            range_m: state.range.map(|range| range.distance_m),
+            ages: state.ages.into(),
+            link: state.link.map(Into::into),
+            firmware: state.firmware.as_ref().map(Into::into),
         }
     }
 }

@@ -19,13 +19,16 @@ pub(super) struct Gateway {
 }
 
 impl Gateway {
-    /// A client, and whether to print JSON.
-    pub(super) fn open(self) -> anyhow::Result<(Client, bool)> {
+    /// A client, and whether to print JSON. An answer may take as long as `patience`.
+    pub(super) fn open(self, patience: Duration) -> anyhow::Result<(Client, bool)> {
         reqwest::Url::parse(&self.url).map_err(|error| ConfigError::new(format!("--url {:?}: {error}", self.url)))?;
-        let http = reqwest::Client::builder().timeout(Duration::from_secs(15)).no_proxy().build()?;
+        let http = reqwest::Client::builder().timeout(patience).no_proxy().build()?;
         Ok((Client { http, url: self.url }, self.json))
     }
 }
+
+/// What most answers take at most.
+pub(super) const PATIENCE: Duration = Duration::from_secs(15);
 
 pub(super) struct Client {
     http: reqwest::Client,
@@ -47,4 +50,9 @@ impl Client {
         let told = |key: &str| value.get(key).and_then(Value::as_str).filter(|text| !text.is_empty());
         anyhow::bail!("{}", told("detail").or(told("title")).unwrap_or(status.as_str()))
     }
+}
+
+/// A text of an object, or a dash.
+pub(super) fn text<'a>(value: &'a Value, key: &str) -> &'a str {
+    value[key].as_str().unwrap_or("-")
 }

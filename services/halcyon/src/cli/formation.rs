@@ -7,7 +7,7 @@ use halcyon_chassis::{ConfigError, process};
 use reqwest::Method;
 use serde_json::{Value, json};
 
-use super::client::{Client, Gateway};
+use super::client::{Client, Gateway, PATIENCE};
 use super::output;
 
 /// Have followers keep a shape about a leader of a running fleet
@@ -56,7 +56,7 @@ enum Command {
 }
 
 pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let (client, json) = args.gateway.open()?;
+    let (client, json) = args.gateway.open(PATIENCE)?;
     process::runtime()?.block_on(command(&client, args.command, json))
 }
 

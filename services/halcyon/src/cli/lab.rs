@@ -72,6 +72,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     }
     let bar = output::bar("experiments");
     bar.set_length(chosen.len() as u64);
+    let lab = lab.heard_by({
+        let bar = bar.clone();
+        move |done, of| bar.set_message(format!("{done} of {of}"))
+    });
     let total = chosen.len();
     let mut exhibits: Vec<(&Experiment, Exhibit)> = Vec::new();
     for (number, experiment) in chosen.into_iter().enumerate() {

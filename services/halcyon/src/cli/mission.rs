@@ -7,7 +7,7 @@ use halcyon_chassis::{ConfigError, process};
 use reqwest::Method;
 use serde_json::{Value, json};
 
-use super::client::{Client, Gateway};
+use super::client::{Client, Gateway, PATIENCE, text};
 use super::output;
 
 /// Create, watch and command missions of a running fleet
@@ -86,7 +86,7 @@ enum Command {
 }
 
 pub(super) fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let (client, json) = args.gateway.open()?;
+    let (client, json) = args.gateway.open(PATIENCE)?;
     process::runtime()?.block_on(command(&client, args.command, json))
 }
 
@@ -104,8 +104,13 @@ async fn command(client: &Client, command: Command, json: bool) -> anyhow::Resul
             if let Some(height) = height {
                 body["survey_height_m"] = height.into();
             }
-            let mission = client.send(Method::POST, "missions", Some(body)).await?;
-            return show(&mission, json);
+            let answer = client.send(Method::POST, "missions", Some(body)).await?;
+            if json {
+                output::json(&answer)?;
+            } else {
+                output::line(&format!("{}: {}", text(&answer, "mission"), text(&answer, "reason")))?;
+            }
+            return Ok(ExitCode::SUCCESS);
         }
         Command::List => {
             let page = client.send(Method::GET, "missions?limit=100", None).await?;
@@ -139,10 +144,6 @@ async fn command(client: &Client, command: Command, json: bool) -> anyhow::Resul
 fn path(id: &str, verb: &str) -> anyhow::Result<String> {
     let id = halcyon_model::MissionId::new(id).map_err(|error| ConfigError::new(error.to_string()))?;
     Ok(if verb.is_empty() { format!("missions/{id}") } else { format!("missions/{id}/{verb}") })
-}
-
-fn text<'a>(mission: &'a Value, key: &str) -> &'a str {
-    mission[key].as_str().unwrap_or("-")
 }
 
 fn summary(mission: &Value) -> String {

@@ -18,6 +18,7 @@ mod sim;
 mod survey;
 mod up;
 mod usage;
+mod vehicle;
 mod waves;
 
 use std::process::ExitCode;
@@ -67,6 +68,8 @@ enum Command {
     Formation(formation::Args),
     /// Create, watch and command missions of a running fleet
     Mission(mission::Args),
+    /// Look at, command and set up the vehicles of a running fleet: parameters, missions, fences, payload
+    Vehicle(vehicle::Args),
     /// Simulate: render water to a survey folder, or serve vehicles over MAVLink
     Sim(sim::Args),
     /// Print the effective configuration, and where each value came from
@@ -99,6 +102,7 @@ pub fn main() -> ExitCode {
         Command::Lab(args) => lab::run(&args),
         Command::Formation(args) => formation::run(args),
         Command::Mission(args) => mission::run(args),
+        Command::Vehicle(args) => vehicle::run(args),
         Command::Sim(args) => sim::run(&options, args),
         Command::Config(args) => config::run(&options, &args),
     };

@@ -59,9 +59,21 @@ pub enum LabError {
     /// A formation flight.
     #[error(transparent)]
     Flight(#[from] halcyon_vehicle_link::experiment::FlightError),
+    /// An identifier.
+    #[error(transparent)]
+    Id(#[from] halcyon_model::IdError),
     /// A temporary file.
     #[error("a temporary file could not be written")]
     Temporary(#[from] std::io::Error),
+}
+
+/// Hears how much of how much of an experiment is done.
+struct Progress(Box<dyn Fn(usize, usize) + Send + Sync>);
+
+impl std::fmt::Debug for Progress {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Progress")
+    }
 }
 
 /// Where experiments take place.
@@ -71,6 +83,7 @@ pub struct Lab {
     /// How much of each to run.
     pub extent: Extent,
     calibration: OnceCell<(CalibrateReport, Calibration)>,
+    progress: Option<Progress>,
 }
 
 /// A rectified pair of a textured object, with its true disparity.
@@ -86,7 +99,19 @@ impl Lab {
     /// With OpenCV's public pictures in the folder `samples`, which experiments on simulated water do without.
     #[must_use]
     pub fn new(samples: PathBuf, extent: Extent) -> Self {
-        Self { samples, extent, calibration: OnceCell::new() }
+        Self { samples, extent, calibration: OnceCell::new(), progress: None }
+    }
+
+    /// Lets `progress` hear, on any thread, how much of how much of a long experiment is done.
+    #[must_use]
+    pub fn heard_by(mut self, progress: impl Fn(usize, usize) + Send + Sync + 'static) -> Self {
+        self.progress = Some(Progress(Box::new(progress)));
+        self
+    }
+
+    /// To be told how much of how much is done.
+    pub(super) fn progress(&self) -> &(dyn Fn(usize, usize) + Send + Sync) {
+        self.progress.as_ref().map_or(&|_, _| (), |Progress(progress)| progress.as_ref())
     }
 
     /// `full` or, for a quick look, `quick`.

@@ -20,6 +20,7 @@ mod parts;
 mod pictures;
 mod speed;
 mod tank;
+mod verdicts;
 
 pub use context::{Lab, LabError};
 pub use exhibit::{Exhibit, File, Finding, number};
@@ -145,6 +146,12 @@ pub const EXPERIMENTS: &[Experiment] = &[
         shows: &["figure 7-6", "figure 7-7", "figure 7-8", "table 7-1", "table 7-2"],
         about: "From the air: outliers, crests and troughs, wave heights against the truth",
         run: air::run,
+    },
+    Experiment {
+        name: "verdicts",
+        shows: &["beyond the thesis"],
+        about: "How far a verdict can be trusted: thousands of random seas about the limits",
+        run: verdicts::run,
     },
 ];
 

@@ -6,9 +6,10 @@ use std::sync::atomic::{AtomicU8, AtomicUsize, Ordering};
 use std::task::{Context, Poll};
 
 use halcyon_model::Bytes;
-use halcyon_sim::autopilot::{Inbound, LinkId, Outbound};
+use halcyon_sim::autopilot::{LinkId, Outbound};
+use halcyon_sim::vehicle::Vehicle;
 use mavlink::dialects::ardupilotmega::MavMessage;
-use mavlink::{AsyncMavlinkReader, MAVLinkMessageRaw, MavHeader, MavlinkReader, MavlinkVersion};
+use mavlink::{AsyncMavlinkReader, MAVLinkMessageRaw, MavlinkReader, MavlinkVersion};
 use tokio::io::{AsyncRead, AsyncWriteExt, ReadBuf};
 use tokio::net::{TcpStream, UdpSocket};
 use tokio::sync::mpsc;
@@ -27,7 +28,7 @@ const UDP_BATCH_BYTES: usize = 1200;
 /// The vehicle's end of a connection. Dropping it closes the connection.
 pub(super) struct Client {
     pub(super) link: LinkId,
-    inbound: mpsc::Receiver<Inbound>,
+    inbound: mpsc::Receiver<MAVLinkMessageRaw>,
     outbound: mpsc::Sender<Bytes>,
     spoken: Arc<AtomicU8>,
     sequence: u8,
@@ -75,10 +76,10 @@ impl Client {
     }
 
     /// Up to a queueful of what it said; `None` once it is gone.
-    pub(super) fn heard(&mut self, mut each: impl FnMut(&Inbound)) -> Result<(), Gone> {
+    pub(super) fn heard(&mut self, mut each: impl FnMut(&MAVLinkMessageRaw)) -> Result<(), Gone> {
         for _ in 0..INBOUND_MAX {
             match self.inbound.try_recv() {
-                Ok(inbound) => each(&inbound),
+                Ok(frame) => each(&frame),
                 Err(mpsc::error::TryRecvError::Empty) => break,
                 Err(mpsc::error::TryRecvError::Disconnected) => return Err(Gone::Closed),
             }
@@ -86,13 +87,12 @@ impl Client {
         Ok(())
     }
 
-    /// Adds a message to the batch.
-    pub(super) fn say(&mut self, system_id: u8, outbound: &Outbound) -> Result<(), Gone> {
+    /// Adds a message of the vehicle's to the batch.
+    pub(super) fn say(&mut self, vehicle: &mut Vehicle, outbound: &Outbound) -> Result<(), Gone> {
         // As ArduPilot: MAVLink 2, unless all that was heard is MAVLink 1.
         let version = if self.spoken.load(Ordering::Relaxed) == 1 { MavlinkVersion::V1 } else { MavlinkVersion::V2 };
-        let header = MavHeader { system_id: u32::from(system_id), component_id: 1, sequence: self.sequence };
+        vehicle.encode(self.link, outbound, version, self.sequence, &mut self.batch);
         self.sequence = self.sequence.wrapping_add(1);
-        outbound.encode(version, header, &mut self.batch);
         // A frame is at most 280 bytes: the next might not fit.
         if self.batch.len() + 280 > self.batch_max { self.flush() } else { Ok(()) }
     }
@@ -115,20 +115,17 @@ impl Client {
 
 /// The socket's end.
 struct Ends {
-    inbound: mpsc::Sender<Inbound>,
+    inbound: mpsc::Sender<MAVLinkMessageRaw>,
     outbound: mpsc::Receiver<Bytes>,
     close: CancellationToken,
     spoken: Arc<AtomicU8>,
 }
 
 /// Notes the newest version that was spoken, and passes on what was said; `false` once nobody listens.
-async fn pass(raw: &MAVLinkMessageRaw, spoken: &AtomicU8, inbound: &mpsc::Sender<Inbound>) -> bool {
-    let number = if raw.version() == MavlinkVersion::V1 { 1 } else { 2 };
+async fn pass(frame: MAVLinkMessageRaw, spoken: &AtomicU8, inbound: &mpsc::Sender<MAVLinkMessageRaw>) -> bool {
+    let number = if frame.version() == MavlinkVersion::V1 { 1 } else { 2 };
     spoken.fetch_max(number, Ordering::Relaxed);
-    match Inbound::decode(raw) {
-        Some(message) => inbound.send(message).await.is_ok(),
-        None => true,
-    }
+    inbound.send(frame).await.is_ok()
 }
 
 impl Ends {
@@ -143,7 +140,7 @@ impl Ends {
         let reading = async {
             while let Ok(raw) = reader.read_any_raw_message::<MavMessage>().await {
                 unframed.store(0, Ordering::Relaxed);
-                if !pass(&raw, &spoken, &inbound).await {
+                if !pass(raw, &spoken, &inbound).await {
                     break;
                 }
             }
@@ -172,7 +169,7 @@ impl Ends {
                 let Ok(length) = socket.recv(&mut datagram).await else { continue };
                 let mut reader = MavlinkReader::new(&datagram[..length]);
                 while let Ok(raw) = reader.read_any_raw_message::<MavMessage>() {
-                    if !pass(&raw, &spoken, &inbound).await {
+                    if !pass(raw, &spoken, &inbound).await {
                         return;
                     }
                 }

@@ -102,7 +102,7 @@ impl Server {
         let Self { vehicle, clients, .. } = self;
         clients.retain_mut(|client| {
             let link = client.link;
-            let heard = client.heard(|inbound| vehicle.handle(link, inbound));
+            let heard = client.heard(|frame| vehicle.receive(link, frame));
             keep(vehicle, link, heard)
         });
         self.advance().await?;
@@ -136,11 +136,11 @@ impl Server {
     /// Hands out what the autopilot says.
     fn speak(&mut self) {
         let Self { vehicle, clients, .. } = self;
-        let system_id = vehicle.autopilot().system_id();
         let mut gone: Vec<(LinkId, Gone)> = Vec::new();
-        for (link, outbound) in vehicle.take_outbox() {
+        let said: Vec<_> = vehicle.take_outbox().collect();
+        for (link, outbound) in said {
             for client in clients.iter_mut().filter(|client| link.is_none_or(|link| link == client.link)) {
-                if let Err(why) = client.say(system_id, &outbound) {
+                if let Err(why) = client.say(vehicle, &outbound) {
                     gone.push((client.link, why));
                 }
             }

@@ -143,9 +143,17 @@ impl Fleet {
             .map(|(vehicle, _)| vehicle)
     }
 
-    /// Why `vehicle` cannot be sent now; `None` if it can. `named` says that the mission asks for this very vehicle.
+    /// Why `vehicle` cannot be sent now; `None` if it can. `named` says that this very vehicle is asked for,
+    /// `ours` that what it does in the air it does for a formation.
     #[must_use]
-    pub(super) fn obstacle(&self, vehicle: &VehicleId, role: Role, named: bool, world: &World<'_>) -> Option<String> {
+    pub(super) fn obstacle(
+        &self,
+        vehicle: &VehicleId,
+        role: Role,
+        named: bool,
+        ours: bool,
+        world: &World<'_>,
+    ) -> Option<String> {
         let (now, config) = (world.now, world.config);
         let Some(state) = self.last(vehicle) else { return Some("not heard yet".into()) };
         if state.role != role {
@@ -169,7 +177,7 @@ impl Fleet {
             (_, LandedState::OnGround) if !state.ready_to_arm => Some("not ready to arm".into()),
             (_, LandedState::OnGround) => away_from_home(state, named, config),
             (Activity::Idle | Activity::Holding { .. }, LandedState::InAir) => None,
-            (Activity::Following { .. }, LandedState::InAir) if world.formations.leader_of(vehicle).is_some() => None,
+            (_, LandedState::InAir) if ours => None,
             (_, LandedState::Unknown) => Some("it is not known whether it is on the ground".into()),
             _ => Some("busy in the air".into()),
         }
@@ -198,7 +206,7 @@ impl Fleet {
             let obstacle = if taken.contains(vehicle) {
                 Some("busy in another mission".into())
             } else {
-                self.obstacle(vehicle, role, named.is_some(), world)
+                self.obstacle(vehicle, role, named.is_some(), world.formations.leader_of(vehicle).is_some(), world)
             };
             if let Some(obstacle) = obstacle {
                 reasons.push(format!("{vehicle}: {obstacle}"));

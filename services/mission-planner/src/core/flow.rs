@@ -70,7 +70,7 @@ fn follower_fault(live: &Live, world: &World<'_>) -> Option<String> {
 fn waiting(live: &mut Live, world: &World<'_>, taken: &BTreeSet<VehicleId>) -> Option<Step> {
     let spot = live.spot();
     let named = live.mission.spec.leader.clone();
-    match world.fleet.pick(Role::Leader, named.as_ref(), spot, taken, world.now, world.config) {
+    match world.fleet.pick(Role::Leader, named.as_ref(), spot, taken, world) {
         Ok((leader, place)) => {
             // The heading of the way there, kept for the whole mission: the nose points away from home and from the follower.
             let heading_rad = geometry::bearing_rad(place, spot)
@@ -199,7 +199,7 @@ fn take_follower(live: &mut Live, world: &World<'_>, taken: &BTreeSet<VehicleId>
     let spot = live.spot();
     let taken: BTreeSet<VehicleId> = taken.union(&live.tried).cloned().collect();
     let named = live.mission.spec.follower.clone();
-    let (follower, place) = world.fleet.pick(Role::Follower, named.as_ref(), spot, &taken, world.now, world.config)?;
+    let (follower, place) = world.fleet.pick(Role::Follower, named.as_ref(), spot, &taken, world)?;
     live.course.abreast_m = world.config.slot_abreast_m * geometry::side(spot, live.heading_rad(), place);
     let why = format!("{follower} is sent, {:.0} m from the spot", place.distance_m(&spot));
     live.mission.follower = Some(follower);

@@ -13,9 +13,12 @@ use super::fleet::role_name;
 use super::geometry::offset;
 use super::live::World;
 use super::shape::shape;
+use crate::config::Config;
 
 /// Followers of one leader.
-pub const MEMBERS_MAX: usize = 16;
+const MEMBERS_MAX: usize = 16;
+/// Slots beyond the shape for those who must make room: a slot that is reserved is too near to two of them at most.
+const EXTRA: usize = 3;
 /// Farther apart than this it is no formation, metres.
 const SPACING_M_MAX: f64 = 100.0;
 
@@ -75,22 +78,49 @@ impl Formations {
         Some(changed)
     }
 
-    /// What the members that nobody else needs are to do.
-    pub(super) fn assignments(&self, busy: &BTreeSet<VehicleId>) -> Vec<Assignment> {
+    /// What the members that nobody else needs are to do. `reserved`: where a leader's mission has its own follower; a member whose
+    /// slot is too near to that takes the next one of the shape that is free.
+    pub(super) fn assignments(
+        &self,
+        busy: &BTreeSet<VehicleId>,
+        reserved: &BTreeMap<VehicleId, Slot>,
+        config: &Config,
+    ) -> Vec<Assignment> {
         let of = |(leader, formation): (&VehicleId, &Formation)| -> Vec<Assignment> {
+            let count = formation.members.len();
+            let reserved = reserved.get(leader);
+            let is_clear = |slot: &Slot| reserved.is_none_or(|other| apart_m(slot, other) >= config.separation_m);
+            let mut more = slots_of(&formation.spec, count + EXTRA, config).into_iter().skip(count).filter(is_clear);
             let free = formation.members.iter().filter(|(member, _)| !busy.contains(member));
-            let task = |slot: &Slot| Task::Follow { leader: leader.clone(), slot: *slot };
-            free.map(|(member, slot)| Assignment { vehicle: member.clone(), task: task(slot) }).collect()
+            let mut kept = |slot: &Slot| if is_clear(slot) { Some(*slot) } else { more.next() };
+            let task = |slot: Option<Slot>| slot.map_or(Task::Hold, |slot| Task::Follow { leader: leader.clone(), slot });
+            free.map(|(member, slot)| Assignment { vehicle: member.clone(), task: task(kept(slot)) }).collect()
         };
         self.0.iter().flat_map(of).collect()
     }
 }
 
-/// Checks an order and gives out the slots. `taken`: vehicles that other missions and formations have.
+fn apart_m(a: &Slot, b: &Slot) -> f64 {
+    (a.forward_m - b.forward_m).hypot(a.right_m - b.right_m).hypot(a.up_m - b.up_m)
+}
+
+/// The first `count` slots of what is asked for, at the height that followers keep.
+fn slots_of(spec: &FormationSpec, count: usize, config: &Config) -> Vec<Slot> {
+    let slots = shape(spec.shape, count, spec.spacing_m).into_iter();
+    slots.map(|slot| Slot { up_m: slot.up_m + config.slot_up_m, ..slot }).collect()
+}
+
+/// Checks an order and gives out the slots. `taken`: vehicles that other missions and formations have; `called_back`: those that are on
+/// their way home from a formation.
 ///
 /// # Errors
 /// Why it cannot be.
-pub(super) fn form(spec: &FormationSpec, taken: &BTreeSet<VehicleId>, world: &World<'_>) -> Result<Formation, String> {
+pub(super) fn form(
+    spec: &FormationSpec,
+    taken: &BTreeSet<VehicleId>,
+    called_back: &BTreeSet<VehicleId>,
+    world: &World<'_>,
+) -> Result<Formation, String> {
     let (least_m, spacing_m) = (world.config.separation_m, spec.spacing_m);
     if !(least_m..=SPACING_M_MAX).contains(&spacing_m) {
         return Err(format!("the spacing must be {least_m} to {SPACING_M_MAX} m, not {spacing_m} m"));
@@ -103,11 +133,8 @@ pub(super) fn form(spec: &FormationSpec, taken: &BTreeSet<VehicleId>, world: &Wo
     let Some(state) = world.fleet.fresh(leader, world.now, world.config) else {
         return Err(format!("{leader} has not been heard lately"));
     };
-    let followers = followers(spec, taken, world)?;
-    let slots: Vec<Slot> = shape(spec.shape, followers.len(), spacing_m)
-        .into_iter()
-        .map(|slot| Slot { up_m: slot.up_m + world.config.slot_up_m, ..slot })
-        .collect();
+    let followers = followers(spec, taken, called_back, world)?;
+    let slots = slots_of(spec, followers.len(), world.config);
     let here = LocalPoint::from(state.position_ned_m);
     let targets: Vec<_> = slots.iter().map(|slot| offset(here, state.heading_rad, slot.forward_m, slot.right_m)).collect();
     let places: Vec<_> = followers.iter().map(|(_, place)| *place).collect();
@@ -120,6 +147,7 @@ pub(super) fn form(spec: &FormationSpec, taken: &BTreeSet<VehicleId>, world: &Wo
 fn followers(
     spec: &FormationSpec,
     taken: &BTreeSet<VehicleId>,
+    called_back: &BTreeSet<VehicleId>,
     world: &World<'_>,
 ) -> Result<Vec<(VehicleId, LocalPoint)>, String> {
     let named: BTreeSet<_> = spec.followers.iter().cloned().collect();
@@ -132,9 +160,10 @@ fn followers(
     let mut reasons = Vec::new();
     for vehicle in candidates {
         let obstacle = if taken.contains(&vehicle) {
-            Some("busy in a mission or another formation".to_owned())
+            Some("in a mission, on its way home from one, or in another formation".to_owned())
         } else {
-            world.fleet.obstacle(&vehicle, Role::Follower, !named.is_empty(), world)
+            let ours = called_back.contains(&vehicle) || world.formations.leader_of(&vehicle).is_some();
+            world.fleet.obstacle(&vehicle, Role::Follower, !named.is_empty(), ours, world)
         };
         match (obstacle, world.fleet.last(&vehicle)) {
             (None, Some(state)) => found.push((vehicle, LocalPoint::from(state.position_ned_m))),

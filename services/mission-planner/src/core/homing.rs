@@ -1,6 +1,6 @@
 //! Vehicles whose mission is over, until they are down and may be used again.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use halcyon_model::{Assignment, LandedState, MissionId, Severity, Stamp, Task, VehicleId};
 
@@ -30,6 +30,21 @@ impl Homings {
 
     pub(super) fn vehicles(&self) -> impl Iterator<Item = &VehicleId> {
         self.0.keys()
+    }
+
+    /// Those who flew for a mission.
+    pub(super) fn after_missions(&self) -> impl Iterator<Item = &VehicleId> {
+        self.0.iter().filter(|(_, homing)| homing.mission.is_some()).map(|(vehicle, _)| vehicle)
+    }
+
+    /// Those who were called back from a formation.
+    pub(super) fn after_formations(&self) -> BTreeSet<VehicleId> {
+        self.0.iter().filter(|(_, homing)| homing.mission.is_none()).map(|(vehicle, _)| vehicle.clone()).collect()
+    }
+
+    /// It has something else to do.
+    pub(super) fn recall(&mut self, vehicle: &VehicleId) {
+        self.0.remove(vehicle);
     }
 
     /// Lets go of whoever is down and disarmed, or has been taken over by its pilot, and knows that its task is over.

@@ -218,11 +218,12 @@ impl Planner {
         let mut taken: BTreeSet<VehicleId> = own.flat_map(|live| live.crew().chain(&live.dropped)).cloned().collect();
         let followers = self.live.iter().filter_map(|live| live.mission.follower.as_ref());
         taken.extend(followers.chain(self.formations.members_of_others(Some(leader))).cloned());
-        taken.extend(self.homings.vehicles().cloned());
+        // Whoever was only called back from a formation may be called again.
+        taken.extend(self.homings.after_missions().cloned());
         if taken.contains(leader) && self.homings.vehicles().any(|vehicle| vehicle == leader) {
             return Err(format!("{leader} is on its way home"));
         }
-        let formation = formation::form(spec, &taken, &self.world(now))?;
+        let formation = formation::form(spec, &taken, &self.homings.after_formations(), &self.world(now))?;
         let count = formation.members.len();
         let words = format!("{count} in {} about {leader}", spec.shape.as_str());
         let same = |before: &Formation| before.spec == *spec && before.members.keys().eq(formation.members.keys());
@@ -231,6 +232,9 @@ impl Planner {
         }
         effects.records.push(Record::Formed { formation: formation.clone(), who: who.into(), stamp: now });
         effects.notices.push(order("formation ordered", format!("{who}: {words}"), leader));
+        for member in formation.members.keys() {
+            self.homings.recall(member);
+        }
         for vehicle in self.formations.put(formation) {
             self.homings.add(vehicle, None, false, now);
         }
@@ -262,7 +266,9 @@ impl Planner {
         }
         assignments.extend(self.homings.assignments(&world));
         let busy = assignments.iter().map(|assignment| assignment.vehicle.clone()).collect();
-        assignments.extend(self.formations.assignments(&busy));
+        let with_follower = self.live.iter().filter(|live| live.mission.follower.is_some());
+        let reserved = with_follower.filter_map(|live| Some((live.mission.leader.clone()?, live.slot(&self.config)))).collect();
+        assignments.extend(self.formations.assignments(&busy, &reserved, &self.config));
         if let Some(issued) = &self.issued
             && issued.assignments == assignments
             && issued.generation == self.generation

@@ -274,6 +274,20 @@ impl World {
         assert!(plan.valid_until > self.now && plan.stamp == self.now);
         let vehicles: BTreeSet<_> = plan.assignments.iter().map(|assignment| &assignment.vehicle).collect();
         assert_eq!(vehicles.len(), plan.assignments.len(), "a vehicle has two tasks: {plan:#?}");
+        let follows = |assignment: &halcyon_model::Assignment| match &assignment.task {
+            Task::Follow { leader, slot } => {
+                Some((leader.clone(), nalgebra::Vector3::new(slot.forward_m, slot.right_m, slot.up_m)))
+            }
+            _ => None,
+        };
+        let slots: Vec<_> = plan.assignments.iter().filter_map(follows).collect();
+        for (index, (leader, slot)) in slots.iter().enumerate() {
+            assert!(slot.norm() >= 5.0, "a slot on the leader: {plan:#?}");
+            let others = slots[index + 1..].iter().filter(|(other, _)| other == leader);
+            for (_, other) in others {
+                assert!((slot - other).norm() >= 5.0, "two followers in one slot: {plan:#?}");
+            }
+        }
         let mut places: Vec<LocalPoint> = Vec::new();
         for assignment in &plan.assignments {
             let point = match &assignment.task {

@@ -54,6 +54,26 @@ pub enum Difference {
     },
 }
 
+impl std::fmt::Display for Difference {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let mut ratio = |what: &str, ratio: &Ratio| {
+            let (low, high) = ratio.interval_both_95();
+            write!(f, "{what} is {:.3} times the witness's ({low:.3} to {high:.3})", ratio.value)
+        };
+        match self {
+            Self::Height(of) => ratio("H_m0", of),
+            Self::Period(of) => ratio("the mean period", of),
+            Self::UpsideDown { .. } => f.write_str("it moves the other way, as if one of the two were positive down"),
+            Self::Peak { a_s, b_s } => {
+                write!(f, "peak period of {:.2} to {:.2} s against the witness's {:.2} to {:.2} s", a_s.0, a_s.1, b_s.0, b_s.1)
+            }
+            Self::WavesInOne { which, h_m0_m, other_h_m0_m } => {
+                write!(f, "{which} has waves of {h_m0_m:.3} m at least, the other at most {other_h_m0_m:.3} m")
+            }
+        }
+    }
+}
+
 /// Why nothing can be said.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Ignorance {

@@ -1,5 +1,7 @@
 //! Arming, disarming and their checks.
 
+use std::borrow::Cow;
+
 use mavlink::dialects::ardupilotmega::MavSeverity;
 
 use super::{Autopilot, Param};
@@ -9,7 +11,14 @@ const PREARM_EVERY_S: f64 = 30.0;
 
 impl Autopilot {
     /// Why it would not arm in any mode; `None` when it would.
-    pub(super) fn prearm_problem(&self) -> Option<&'static str> {
+    pub(super) fn prearm_problem(&self) -> Option<Cow<'static, str>> {
+        if self.params.get(Param::ArmingCheck) != 0.0 && self.fence.is_breached() {
+            return Some(Cow::Owned(format!("vehicle outside {}", self.fence.names())));
+        }
+        self.sensor_problem().map(Cow::Borrowed)
+    }
+
+    fn sensor_problem(&self) -> Option<&'static str> {
         if self.params.get(Param::ArmingCheck) == 0.0 {
             return None;
         }
@@ -38,7 +47,7 @@ impl Autopilot {
         let problem = if force {
             None
         } else if let Some(problem) = self.prearm_problem() {
-            Some(problem.to_owned())
+            Some(problem.into_owned())
         } else if !self.mode.may_arm() {
             Some(format!("{} mode not armable", self.mode.name()))
         } else if self.mode.needs_position() && !self.sensed.estimate.position_ok {

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use super::control::{Yaw, heading_rad};
 use super::guided::Guided;
 use super::streams::is_streamable;
-use super::{Autopilot, LinkId, Mode};
+use super::{Autopilot, LinkId, Mode, Param};
 
 /// The number that forces arming, and the one that forces disarming in the air.
 const FORCE_ARM: f32 = 2989.0;
@@ -58,7 +58,7 @@ impl Autopilot {
         let [p1, p2, p3, p4] = command.params;
         match command.command {
             Cmd::MAV_CMD_COMPONENT_ARM_DISARM => self.arm_or_disarm(p1, p2),
-            Cmd::MAV_CMD_DO_SET_MODE => self.mode_by_number(p1, p2),
+            Cmd::MAV_CMD_DO_SET_MODE => self.mode_by_number(p1 as u32, p2 as u32),
             Cmd::MAV_CMD_NAV_TAKEOFF => self.take_off(f64::from(command.place.z())),
             Cmd::MAV_CMD_NAV_LAND => outcome(self.set_mode(Mode::Land).is_ok()),
             Cmd::MAV_CMD_NAV_RETURN_TO_LAUNCH => outcome(self.set_mode(Mode::Rtl).is_ok()),
@@ -77,6 +77,10 @@ impl Autopilot {
                 }
             }
             Cmd::MAV_CMD_DO_SET_SERVO => self.set_servo(p1, p2),
+            Cmd::MAV_CMD_DO_GRIPPER => self.move_gripper(p2),
+            Cmd::MAV_CMD_DO_SET_RELAY => self.set_relay(p1, p2),
+            Cmd::MAV_CMD_DO_FENCE_ENABLE => self.enable_fence(p1),
+            Cmd::MAV_CMD_DO_SET_MISSION_CURRENT => outcome(p1 >= 0.0 && self.set_current(p1 as u16)),
             Cmd::MAV_CMD_SET_MESSAGE_INTERVAL => self.set_interval(command.link, p1, p2),
             Cmd::MAV_CMD_GET_MESSAGE_INTERVAL => self.tell_interval(command.link, p1),
             Cmd::MAV_CMD_REQUEST_MESSAGE => self.tell_once(command.link, p1),
@@ -108,12 +112,25 @@ impl Autopilot {
         }
     }
 
-    fn mode_by_number(&mut self, base_mode: f32, number: f32) -> mav::MavResult {
-        if base_mode as u32 & 1 == 0 {
+    /// A mode by its number, as a message or a command asks for it.
+    pub(super) fn mode_by_number(&mut self, base_mode: u32, number: u32) -> mav::MavResult {
+        if base_mode & 1 == 0 {
             // Without MAV_MODE_FLAG_CUSTOM_MODE_ENABLED the number means nothing here.
             return mav::MavResult::MAV_RESULT_DENIED;
         }
-        outcome(self.request_mode(number as u32))
+        outcome(self.request_mode(number))
+    }
+
+    fn enable_fence(&mut self, enable: f32) -> mav::MavResult {
+        let wanted = match enable as i32 {
+            0 => 0.0,
+            1 => 1.0,
+            // Only a floor, which this fence has not.
+            2 => return mav::MavResult::MAV_RESULT_ACCEPTED,
+            _ => return mav::MavResult::MAV_RESULT_FAILED,
+        };
+        self.params.assign(Param::FenceEnable, wanted);
+        mav::MavResult::MAV_RESULT_ACCEPTED
     }
 
     /// A mode by its number; `false` when it can't be.
@@ -164,8 +181,12 @@ impl Autopilot {
         mav::MavResult::MAV_RESULT_ACCEPTED
     }
 
-    fn change_speed(&mut self, kind: f32, speed_mps: f32) -> mav::MavResult {
-        if !speed_mps.is_finite() || !(0.05..=20.0).contains(&speed_mps) {
+    /// MAV_CMD_DO_CHANGE_SPEED: only the modes that navigate by themselves have a speed.
+    pub(super) fn change_speed(&mut self, kind: f32, speed_mps: f32) -> mav::MavResult {
+        if !matches!(self.mode, Mode::Guided | Mode::Auto | Mode::Rtl)
+            || !speed_mps.is_finite()
+            || !(0.05..=20.0).contains(&speed_mps)
+        {
             return mav::MavResult::MAV_RESULT_FAILED;
         }
         let speed_mps = Some(f64::from(speed_mps));
@@ -192,6 +213,9 @@ impl Autopilot {
         if self.mode != Mode::Guided && self.set_mode(Mode::Guided).is_err() {
             return mav::MavResult::MAV_RESULT_DENIED;
         }
+        if !self.fence_allows(ned_m) {
+            return mav::MavResult::MAV_RESULT_FAILED;
+        }
         if self.armed && !self.landed {
             self.guided = Guided::Position { ned_m };
         }
@@ -215,20 +239,11 @@ impl Autopilot {
         mav::MavResult::MAV_RESULT_ACCEPTED
     }
 
-    fn set_servo(&mut self, output: f32, width_us: f32) -> mav::MavResult {
-        let index = (output as usize).wrapping_sub(1);
-        match self.servos_us.get_mut(index) {
-            // The first four turn the propellers.
-            Some(servo_us) if index >= 4 && (500.0..=2500.0).contains(&width_us) => {
-                *servo_us = width_us as u16;
-                mav::MavResult::MAV_RESULT_ACCEPTED
-            }
-            _ => mav::MavResult::MAV_RESULT_FAILED,
-        }
-    }
-
     fn set_interval(&mut self, link: LinkId, message_id: f32, interval_us: f32) -> mav::MavResult {
         let id = message_id as u32;
+        if !is_streamable(id) {
+            self.text(mav::MavSeverity::MAV_SEVERITY_INFO, &format!("No ap_message for mavlink id ({id})"));
+        }
         if !is_streamable(id) || !interval_us.is_finite() || interval_us < -1.0 {
             return mav::MavResult::MAV_RESULT_DENIED;
         }

@@ -137,11 +137,6 @@ impl Controller {
         self.position_m
     }
 
-    /// Desired velocity, metres per second.
-    pub(crate) fn desired_velocity_mps(&self) -> Vector3<f64> {
-        self.velocity_mps
-    }
-
     /// Commanded thrust over weight.
     pub(crate) fn thrust_ratio(&self) -> f64 {
         self.thrust_ratio

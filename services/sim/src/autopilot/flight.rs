@@ -4,17 +4,19 @@ use halcyon_model::Stamp;
 use mavlink::dialects::ardupilotmega as mav;
 use nalgebra::{Rotation2, Vector2, Vector3};
 
-use super::control::{Horizontal, Limits, Setpoint, Vertical, Yaw, heading_rad};
+use super::control::{Horizontal, Limits, Setpoint, THRUST_IDLE, Vertical, Yaw, heading_rad};
 use super::guided::Guided;
 use super::{Autopilot, Mode, Param};
 use crate::copter::{Actuation, GRAVITY_MPS2};
 
-/// Below this thrust over weight something else must carry the vehicle.
-const LANDED_THRUST: f64 = 0.3;
-/// ArduCopter's land detector: accelerations and speeds under these for this long.
+/// ArduCopter's land detector: thrust at its lower limit, and accelerations (below 1 Hz) and speeds under these, for this long.
+const LANDED_THRUST: f64 = 1.05 * THRUST_IDLE;
 const LANDED_ACCEL_MPS2: f64 = 1.0;
+const LANDED_ACCEL_HZ: f64 = 1.0;
 const LANDED_SPEED_MPS: f64 = 1.0;
 const LANDED_S: f64 = 1.0;
+/// By a rangefinder that sees anything it must be this low, metres.
+const LANDED_HEIGHT_M: f64 = 2.0;
 /// RTL always climbs at least this, metres, and is over home within this distance, metres.
 const RTL_CLIMB_MIN_M: f64 = 2.0;
 const RTL_HOME_M: f64 = 1.0;
@@ -33,6 +35,8 @@ pub(super) enum Rtl {
 pub(super) struct Flight {
     pub(super) yaw: Yaw,
     rtl: Rtl,
+    /// Where RTL leads.
+    return_to_m: Vector3<f64>,
     /// Overrides of the speed limits, by MAV_CMD_DO_CHANGE_SPEED, until the mode changes.
     pub(super) speed_mps: Option<f64>,
     pub(super) up_mps: Option<f64>,
@@ -42,7 +46,8 @@ pub(super) struct Flight {
     /// AUTO reached its waypoint then.
     pub(super) reached_at: Option<Stamp>,
     landed_for_s: f64,
-    jolt_mps2: f64,
+    /// Acceleration less gravity, filtered.
+    jolt_mps2: Vector3<f64>,
 }
 
 impl Flight {
@@ -50,13 +55,14 @@ impl Flight {
         Self {
             yaw: Yaw::Hold,
             rtl: Rtl::Loiter { down_m: 0.0, since: now },
+            return_to_m: Vector3::zeros(),
             speed_mps: None,
             up_mps: None,
             down_mps: None,
             auto_started: false,
             reached_at: None,
             landed_for_s: 0.0,
-            jolt_mps2: 0.0,
+            jolt_mps2: Vector3::zeros(),
         }
     }
 
@@ -80,6 +86,8 @@ impl Autopilot {
             Some("Missing Takeoff Cmd")
         } else if self.armed && mode.needs_position() && !self.sensed.estimate.position_ok {
             Some("requires position")
+        } else if self.fence_holds_mode() {
+            Some("in fence recovery")
         } else {
             None
         };
@@ -95,6 +103,7 @@ impl Autopilot {
     /// Enters a mode without asking.
     pub(super) fn enter_mode(&mut self, mode: Mode) {
         self.mode = mode;
+        self.fence.mode_left();
         self.controller.start_from(&self.sensed.estimate);
         self.guided = Guided::Hold;
         let facing = match (mode, self.params.get(Param::YawBehaviour) as u32) {
@@ -177,7 +186,7 @@ impl Autopilot {
         }
     }
 
-    fn hold_setpoint(&self) -> Setpoint {
+    pub(super) fn hold_setpoint(&self) -> Setpoint {
         Setpoint { horizontal: Horizontal::HOLD, vertical: Vertical::Rate(0.0), yaw: self.flight.yaw, limits: self.limits() }
     }
 
@@ -188,7 +197,8 @@ impl Autopilot {
             0.0 => self.params.hundredths(Param::SpeedDown),
             set_mps => set_mps,
         };
-        let above_m = self.height_m() - self.params.hundredths(Param::LandAltitudeLow);
+        let height_m = self.height_by_range_m().unwrap_or_else(|| self.height_m());
+        let above_m = height_m - self.params.hundredths(Param::LandAltitudeLow);
         // Slows at WPNAV_ACCEL_Z to the final speed where the final descent begins.
         let accel_mps2 = self.params.hundredths(Param::AccelerationZ);
         let rate_mps = (final_mps * final_mps + 2.0 * accel_mps2 * above_m.max(0.0)).sqrt().min(high_mps.max(final_mps));
@@ -201,9 +211,10 @@ impl Autopilot {
         Setpoint { horizontal, vertical: Vertical::Rate(rate_mps), yaw: self.flight.yaw, limits }
     }
 
-    fn start_rtl(&mut self) {
+    pub(super) fn start_rtl(&mut self) {
         let here_m = self.sensed.estimate.position_ned_m;
-        let home_m = self.home_ned_m.unwrap_or(here_m);
+        let home_m = self.return_place();
+        self.flight.return_to_m = home_m;
         let distance_m = (home_m - here_m).xy().norm();
         let slope = self.params.get(Param::RtlConeSlope);
         let mut height_m = self.params.hundredths(Param::RtlAltitude);
@@ -214,9 +225,9 @@ impl Autopilot {
         self.flight.rtl = Rtl::Climb { place_m: here_m.xy(), down_m };
     }
 
-    fn rtl_setpoint(&mut self) -> Setpoint {
+    pub(super) fn rtl_setpoint(&mut self) -> Setpoint {
         let estimate = self.sensed.estimate;
-        let home_m = self.home_ned_m.unwrap_or(estimate.position_ned_m);
+        let home_m = self.flight.return_to_m;
         self.flight.rtl = match self.flight.rtl {
             Rtl::Climb { down_m, .. } if estimate.position_ned_m.z - down_m < 0.3 => Rtl::Return { down_m },
             Rtl::Return { down_m } if (estimate.position_ned_m - home_m).xy().norm() < RTL_HOME_M => {
@@ -293,93 +304,19 @@ impl Autopilot {
         Setpoint { horizontal, vertical, yaw: self.flight.yaw, limits }
     }
 
-    /// Starts the mission from its first item, or goes on with it.
-    pub(super) fn start_mission(&mut self) {
-        self.flight.auto_started = true;
-        self.flight.reached_at = None;
-        if self.mission.current == 0 || self.mission.complete {
-            self.mission.complete = false;
-            self.mission.current = 1;
-        }
-    }
-
-    fn auto_setpoint(&mut self) -> Setpoint {
-        use mav::MavCmd as Cmd;
-        let hold = self.hold_setpoint();
-        let Some(item) = self.mission.item(self.mission.current).filter(|_| self.flight.auto_started).cloned() else {
-            return hold;
-        };
-        let here_m = self.sensed.estimate.position_ned_m;
-        let home_down_m = self.home_ned_m.map_or(here_m.z, |home_m| home_m.z);
-        // No place means here; AUTO stays where it entered then.
-        let desired_m = self.controller.desired_position_m();
-        let place_m = if item.x == 0 && item.y == 0 {
-            let down_m = if item.is_relative() { home_down_m } else { self.frame.origin().altitude_m } - f64::from(item.z);
-            Vector3::new(desired_m.x, desired_m.y, down_m)
-        } else {
-            self.place(item.frame, item.x, item.y, f64::from(item.z)).unwrap_or(desired_m)
-        };
-        let radius_m = self.params.hundredths(Param::WaypointRadius);
-        let arrived = match item.command {
-            Cmd::MAV_CMD_NAV_TAKEOFF => (here_m.z - place_m.z).abs() < 0.3,
-            Cmd::MAV_CMD_NAV_WAYPOINT => (here_m - place_m).norm() < radius_m,
-            Cmd::MAV_CMD_NAV_LAND => self.landed,
-            _ => false,
-        };
-        if arrived {
-            let since = *self.flight.reached_at.get_or_insert(self.now);
-            let wait_s = if item.command == Cmd::MAV_CMD_NAV_WAYPOINT { f64::from(item.params[0]) } else { 0.0 };
-            if self.now.seconds_since(since) >= wait_s {
-                self.next_item();
-            }
-        }
-        match item.command {
-            Cmd::MAV_CMD_NAV_RETURN_TO_LAUNCH => {
-                if self.flight.reached_at.is_none() {
-                    self.flight.reached_at = Some(self.now);
-                    self.start_rtl();
-                }
-                self.rtl_setpoint()
-            }
-            Cmd::MAV_CMD_NAV_LAND if (here_m - place_m).xy().norm() < radius_m => self.land_setpoint(Some(place_m.xy())),
-            // Towards its landing place it keeps its height.
-            Cmd::MAV_CMD_NAV_LAND => Setpoint { horizontal: Horizontal::to(place_m.xy()), ..hold },
-            Cmd::MAV_CMD_NAV_TAKEOFF => {
-                Setpoint { vertical: Vertical::Position { down_m: place_m.z, velocity_mps: 0.0 }, ..hold }
-            }
-            _ => Setpoint {
-                horizontal: Horizontal::to(place_m.xy()),
-                vertical: Vertical::Position { down_m: place_m.z, velocity_mps: 0.0 },
-                ..hold
-            },
-        }
-    }
-
-    fn next_item(&mut self) {
-        let reached = mav::MISSION_ITEM_REACHED_DATA { seq: self.mission.current };
-        self.say(None, super::Outbound::Message(mav::MavMessage::MISSION_ITEM_REACHED(reached)));
-        self.flight.reached_at = None;
-        if usize::from(self.mission.current) < self.mission.items.len() {
-            self.mission.current += 1;
-        } else {
-            // Nothing left: it holds where it is.
-            self.mission.complete = true;
-            self.flight.auto_started = false;
-        }
-    }
-
     /// ArduCopter's land detector; LAND, RTL and AUTO's landing end with stopped motors.
     pub(super) fn detect_landing(&mut self, dt_s: f64) {
         let estimate = &self.sensed.estimate;
         let push_mps2 = estimate.ned_from_body * self.sensed.specific_force_body_mps2 + Vector3::new(0.0, 0.0, GRAVITY_MPS2);
-        // A first-order filter of half a second: one knock of a wave is no flight.
-        self.flight.jolt_mps2 += (push_mps2.norm() - self.flight.jolt_mps2) * (1.0 - (-dt_s / 0.5).exp());
+        let share = 1.0 - (-std::f64::consts::TAU * LANDED_ACCEL_HZ * dt_s).exp();
+        self.flight.jolt_mps2 += (push_mps2 - self.flight.jolt_mps2) * share;
         if !self.armed || self.landed {
             return;
         }
         let still = self.controller.thrust_ratio() < LANDED_THRUST
-            && self.flight.jolt_mps2 < LANDED_ACCEL_MPS2
-            && estimate.velocity_ned_mps.z.abs() < LANDED_SPEED_MPS;
+            && self.flight.jolt_mps2.norm() < LANDED_ACCEL_MPS2
+            && estimate.velocity_ned_mps.z.abs() < LANDED_SPEED_MPS
+            && self.height_by_range_m().is_none_or(|height_m| height_m < LANDED_HEIGHT_M);
         self.flight.landed_for_s = if still { self.flight.landed_for_s + dt_s } else { 0.0 };
         if self.flight.landed_for_s < LANDED_S {
             return;

@@ -159,9 +159,7 @@ impl Autopilot {
     }
 
     fn stop_guided(&mut self) {
-        if !matches!(self.guided, Guided::TakeOff { .. }) {
-            self.guided = Guided::Hold;
-        }
+        self.guided = Guided::Hold;
     }
 
     fn take_target(&mut self, mask: mav::PositionTargetTypemask, parts: &Parts) {
@@ -175,8 +173,13 @@ impl Autopilot {
             self.stop_guided();
             return;
         }
-        // On the ground only a take-off leaves it, and that goes on to its end.
-        if self.landed || matches!(self.guided, Guided::TakeOff { .. }) {
+        // As on ArduCopter, any target ends a take-off. Before it has lifted off that leaves the vehicle where it stands: on the
+        // ground only a take-off leaves it.
+        if self.landed {
+            return self.stop_guided();
+        }
+        // A place outside the fence is not gone to; what was under way goes on.
+        if parts.ned_m.is_some_and(|ned_m| !self.fence_allows(ned_m)) {
             return;
         }
         let none = Vector3::zeros();

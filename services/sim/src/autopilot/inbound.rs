@@ -3,16 +3,28 @@
 use halcyon_model::Stamp;
 use mavlink::dialects::ardupilotmega as mav;
 use mavlink::dialects::ardupilotmega::MavMessage;
-use mavlink::{MavHeader, Message};
+use mavlink::{MAVLinkMessageRaw, MavHeader, Message, MessageData};
 
 use super::commands::{Command, Place};
-use super::{Autopilot, Inbound, LinkId, Outbound, Param, Sticks, UnknownCommandAck};
+use super::signing::Signing;
+use super::{Autopilot, Inbound, LinkId, Outbound, Param, Sticks, UnlistedAck};
 
 /// The autopilot's component id.
 const COMPONENT: u8 = 1;
+/// MAV_RESULT_UNSUPPORTED.
+const UNSUPPORTED: u8 = 3;
 
 impl Autopilot {
-    /// Takes what came in on a link. What is for another system or component is not touched.
+    /// Takes a frame of valid checksum that came in on a link. With a key set, what is not rightly signed is not looked at.
+    pub fn receive(&mut self, now: Stamp, link: LinkId, frame: &MAVLinkMessageRaw) {
+        if self.signing.as_mut().is_none_or(|signing| signing.accepts(frame))
+            && let Some(inbound) = Inbound::decode(frame)
+        {
+            self.handle(now, link, &inbound);
+        }
+    }
+
+    /// Takes what came in on a link, signatures apart. What is for another system or component is not touched.
     pub fn handle(&mut self, now: Stamp, link: LinkId, inbound: &Inbound) {
         self.now = now;
         match inbound {
@@ -27,8 +39,8 @@ impl Autopilot {
             Inbound::UnknownCommand { header, command, target_system } => {
                 if *target_system == 0 || *target_system == self.system_id() {
                     let (target_system, target_component) = (header.system_id as u8, header.component_id);
-                    let ack = UnknownCommandAck { command: *command, target_system, target_component };
-                    self.say(Some(link), Outbound::Unsupported(ack));
+                    let ack = UnlistedAck { command: *command, result: UNSUPPORTED, target_system, target_component };
+                    self.say(Some(link), Outbound::Acknowledgement(ack));
                 }
             }
         }
@@ -54,9 +66,11 @@ impl Autopilot {
                 place: Place::Int { frame: data.frame, x: data.x, y: data.y, z: data.z },
             }),
             MavMessage::SET_MODE(data) => {
-                if data.base_mode.contains(mav::MavModeFlag::MAV_MODE_FLAG_CUSTOM_MODE_ENABLED) {
-                    self.request_mode(data.custom_mode);
-                }
+                let result = self.mode_by_number(data.base_mode.bits().into(), data.custom_mode) as u8;
+                // ArduPilot acknowledges this message by its own number as if it were a command.
+                let (target_system, target_component) = from;
+                let ack = UnlistedAck { command: mav::SET_MODE_DATA::ID as u16, result, target_system, target_component };
+                self.say(Some(link), Outbound::Acknowledgement(ack));
             }
             MavMessage::SET_POSITION_TARGET_LOCAL_NED(data) => self.local_target(data),
             MavMessage::SET_POSITION_TARGET_GLOBAL_INT(data) => self.global_target(data),
@@ -73,11 +87,24 @@ impl Autopilot {
                 let answer = mav::TIMESYNC_DATA { tc1, ts1: data.ts1, target_system: from.0, target_component: from.1 };
                 self.reply(link, MavMessage::TIMESYNC(answer));
             }
+            MavMessage::SETUP_SIGNING(data) => self.set_up_signing(data),
             MavMessage::PING(data) if data.target_system == 0 => {
                 let answer = mav::PING_DATA { target_system: from.0, target_component: from.1, ..data.clone() };
                 self.reply(link, MavMessage::PING(answer));
             }
-            other => self.transfer(link, from, other),
+            other => {
+                if !self.parameter_protocol(link, other) {
+                    self.mission_protocol(link, from, other);
+                }
+            }
+        }
+    }
+
+    fn set_up_signing(&mut self, data: &mav::SETUP_SIGNING_DATA) {
+        if self.armed {
+            self.text(mav::MavSeverity::MAV_SEVERITY_ERROR, "ERROR: Won't setup signing when armed");
+        } else {
+            self.signing = Signing::from_setup(data);
         }
     }
 

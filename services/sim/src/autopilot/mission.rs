@@ -1,8 +1,7 @@
-//! The stored mission and its transfer protocol.
+//! The stored mission and rally points.
 
+use halcyon_model::Geodetic;
 use mavlink::dialects::ardupilotmega as mav;
-
-use super::streams::LinkId;
 
 /// Most items, item 0 (home) included.
 pub(crate) const ITEMS_MAX: u16 = 724;
@@ -30,6 +29,10 @@ impl Item {
                 | Cmd::MAV_CMD_NAV_LAND
                 | Cmd::MAV_CMD_NAV_RETURN_TO_LAUNCH
                 | Cmd::MAV_CMD_NAV_LOITER_UNLIM
+                | Cmd::MAV_CMD_DO_CHANGE_SPEED
+                | Cmd::MAV_CMD_DO_SET_SERVO
+                | Cmd::MAV_CMD_DO_SET_RELAY
+                | Cmd::MAV_CMD_DO_GRIPPER
         );
         let frame_ok = matches!(
             data.frame,
@@ -57,19 +60,52 @@ impl Item {
         }
     }
 
+    /// Whether it is done at once, on the way to the next place.
+    pub(crate) fn is_immediate(&self) -> bool {
+        use mav::MavCmd as Cmd;
+        matches!(
+            self.command,
+            Cmd::MAV_CMD_DO_CHANGE_SPEED | Cmd::MAV_CMD_DO_SET_SERVO | Cmd::MAV_CMD_DO_SET_RELAY | Cmd::MAV_CMD_DO_GRIPPER
+        )
+    }
+
     /// Whether its altitude counts from home.
     pub(crate) fn is_relative(&self) -> bool {
         matches!(self.frame, mav::MavFrame::MAV_FRAME_GLOBAL_RELATIVE_ALT | mav::MavFrame::MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
     }
 }
 
-/// An upload under way.
-#[derive(Debug, Clone)]
-pub(crate) struct Upload {
-    pub(crate) link: LinkId,
-    pub(crate) from: (u8, u8),
-    pub(crate) count: u16,
-    pub(crate) items: Vec<Item>,
+/// Most rally points; ArduPilot's depend on its storage.
+pub(crate) const RALLY_MAX: u16 = 20;
+
+/// A place to return to instead of home.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct RallyPoint {
+    /// Latitude and longitude, 10⁻⁷ degrees.
+    pub(crate) x: i32,
+    pub(crate) y: i32,
+    /// Above home, whole metres as ArduPilot stores them.
+    pub(crate) height_m: i16,
+}
+
+impl RallyPoint {
+    /// Takes a point off the wire, or says why not.
+    pub(crate) fn check(data: &mav::MISSION_ITEM_INT_DATA) -> Result<Self, mav::MavMissionResult> {
+        use mav::MavFrame as Frame;
+        let relative = matches!(data.frame, Frame::MAV_FRAME_GLOBAL_RELATIVE_ALT | Frame::MAV_FRAME_GLOBAL_RELATIVE_ALT_INT);
+        let place = Geodetic::from_deg(f64::from(data.x) * 1e-7, f64::from(data.y) * 1e-7, 0.0);
+        if data.command != mav::MavCmd::MAV_CMD_NAV_RALLY_POINT {
+            Err(mav::MavMissionResult::MAV_MISSION_UNSUPPORTED)
+        } else if !relative {
+            Err(mav::MavMissionResult::MAV_MISSION_UNSUPPORTED_FRAME)
+        } else if !place.is_valid() {
+            Err(mav::MavMissionResult::MAV_MISSION_INVALID_PARAM5_X)
+        } else if !(f32::from(i16::MIN)..=f32::from(i16::MAX)).contains(&data.z) {
+            Err(mav::MavMissionResult::MAV_MISSION_INVALID_PARAM7)
+        } else {
+            Ok(Self { x: data.x, y: data.y, height_m: data.z as i16 })
+        }
+    }
 }
 
 /// The stored mission. Item 0 is home, as on ArduPilot, and not stored here.
@@ -80,7 +116,6 @@ pub(crate) struct Mission {
     /// Item being flown; 0 before the start.
     pub(crate) current: u16,
     pub(crate) complete: bool,
-    pub(crate) upload: Option<Upload>,
 }
 
 impl Mission {

@@ -104,6 +104,72 @@ params! {
     BatteryCriticalCharge = "BATT_CRT_MAH", MAV_PARAM_TYPE_REAL32, 0.0, 0.0..=1.0e6;
     /// What to do then: 0 nothing, 1 LAND, 2 RTL.
     BatteryCriticalAction = "BATT_FS_CRT_ACT", MAV_PARAM_TYPE_INT8, 0.0, 0.0..=7.0;
+    /// The fence: 0 off, 1 on.
+    FenceEnable = "FENCE_ENABLE", MAV_PARAM_TYPE_INT8, 0.0, 0.0..=1.0;
+    /// Which fences: 1 height, 2 circle about home, 4 polygons and circles that were uploaded.
+    FenceType = "FENCE_TYPE", MAV_PARAM_TYPE_INT8, 7.0, 0.0..=15.0;
+    /// Outside: 0 only says so, 1 RTL, 2 LAND, 3 RTL, 4 BRAKE, 5 LAND (3 and 5 would try SmartRTL first).
+    FenceAction = "FENCE_ACTION", MAV_PARAM_TYPE_INT8, 1.0, 0.0..=5.0;
+    /// Greatest height above home, metres.
+    FenceHeight = "FENCE_ALT_MAX", MAV_PARAM_TYPE_REAL32, 100.0, 10.0..=1000.0;
+    /// Greatest distance from home, metres.
+    FenceRadius = "FENCE_RADIUS", MAV_PARAM_TYPE_REAL32, 300.0, 30.0..=10_000.0;
+    /// 1: while outside, the mode that the fence chose may not be left.
+    FenceOptions = "FENCE_OPTIONS", MAV_PARAM_TYPE_INT16, 1.0, 0.0..=15.0;
+    /// Items stored.
+    FenceTotal = "FENCE_TOTAL", MAV_PARAM_TYPE_INT8, 0.0, 0.0..=255.0;
+    /// Rally points stored.
+    RallyTotal = "RALLY_TOTAL", MAV_PARAM_TYPE_INT8, 0.0, 0.0..=255.0;
+    /// RTL goes to a rally point no further than this, kilometres.
+    RallyLimit = "RALLY_LIMIT_KM", MAV_PARAM_TYPE_REAL32, 0.3, 0.0..=1.0e4;
+    /// 1: home counts as a rally point.
+    RallyHome = "RALLY_INCL_HOME", MAV_PARAM_TYPE_INT8, 1.0, 0.0..=1.0;
+    /// Rangefinder: 0 none, 100 the simulator's.
+    RangefinderType = "RNGFND1_TYPE", MAV_PARAM_TYPE_INT8, 0.0, 0.0..=127.0;
+    /// Where it looks: 25 down.
+    RangefinderOrientation = "RNGFND1_ORIENT", MAV_PARAM_TYPE_INT8, 25.0, 0.0..=40.0;
+    /// Its least distance, centimetres.
+    RangefinderMin = "RNGFND1_MIN_CM", MAV_PARAM_TYPE_INT16, 20.0, 0.0..=30_000.0;
+    /// Its greatest distance, centimetres.
+    RangefinderMax = "RNGFND1_MAX_CM", MAV_PARAM_TYPE_INT16, 700.0, 0.0..=30_000.0;
+    /// Gripper: 0 none.
+    GripperEnable = "GRIP_ENABLE", MAV_PARAM_TYPE_INT8, 0.0, 0.0..=1.0;
+    /// 1: moved by a servo.
+    GripperType = "GRIP_TYPE", MAV_PARAM_TYPE_INT8, 1.0, 0.0..=2.0;
+    /// Pulse that closes it, microseconds.
+    GripperGrab = "GRIP_GRAB", MAV_PARAM_TYPE_INT16, 1900.0, 1000.0..=2000.0;
+    /// Pulse that opens it, microseconds.
+    GripperRelease = "GRIP_RELEASE", MAV_PARAM_TYPE_INT16, 1100.0, 1000.0..=2000.0;
+    /// Pulse before any command, microseconds.
+    GripperNeutral = "GRIP_NEUTRAL", MAV_PARAM_TYPE_INT16, 1500.0, 1000.0..=2000.0;
+    /// 1: relay 1 (0 in commands) is there.
+    Relay1 = "RELAY1_FUNCTION", MAV_PARAM_TYPE_INT8, 0.0, 0.0..=10.0;
+    /// 1: relay 2 is there.
+    Relay2 = "RELAY2_FUNCTION", MAV_PARAM_TYPE_INT8, 0.0, 0.0..=10.0;
+    /// What drives output 5: 0 nothing, 28 the gripper.
+    Servo5 = "SERVO5_FUNCTION", MAV_PARAM_TYPE_INT16, 0.0, -1.0..=200.0;
+    /// What drives output 6: 0 nothing, 28 the gripper.
+    Servo6 = "SERVO6_FUNCTION", MAV_PARAM_TYPE_INT16, 0.0, -1.0..=200.0;
+    /// What drives output 7: 0 nothing, 28 the gripper.
+    Servo7 = "SERVO7_FUNCTION", MAV_PARAM_TYPE_INT16, 0.0, -1.0..=200.0;
+    /// What drives output 8: 0 nothing, 28 the gripper.
+    Servo8 = "SERVO8_FUNCTION", MAV_PARAM_TYPE_INT16, 0.0, -1.0..=200.0;
+    /// What drives output 9: 0 nothing, 28 the gripper.
+    Servo9 = "SERVO9_FUNCTION", MAV_PARAM_TYPE_INT16, 0.0, -1.0..=200.0;
+    /// What drives output 10: 0 nothing, 28 the gripper.
+    Servo10 = "SERVO10_FUNCTION", MAV_PARAM_TYPE_INT16, 0.0, -1.0..=200.0;
+    /// What drives output 11: 0 nothing, 28 the gripper.
+    Servo11 = "SERVO11_FUNCTION", MAV_PARAM_TYPE_INT16, 0.0, -1.0..=200.0;
+    /// What drives output 12: 0 nothing, 28 the gripper.
+    Servo12 = "SERVO12_FUNCTION", MAV_PARAM_TYPE_INT16, 0.0, -1.0..=200.0;
+    /// What drives output 13: 0 nothing, 28 the gripper.
+    Servo13 = "SERVO13_FUNCTION", MAV_PARAM_TYPE_INT16, 0.0, -1.0..=200.0;
+    /// What drives output 14: 0 nothing, 28 the gripper.
+    Servo14 = "SERVO14_FUNCTION", MAV_PARAM_TYPE_INT16, 0.0, -1.0..=200.0;
+    /// What drives output 15: 0 nothing, 28 the gripper.
+    Servo15 = "SERVO15_FUNCTION", MAV_PARAM_TYPE_INT16, 0.0, -1.0..=200.0;
+    /// What drives output 16: 0 nothing, 28 the gripper.
+    Servo16 = "SERVO16_FUNCTION", MAV_PARAM_TYPE_INT16, 0.0, -1.0..=200.0;
     /// Channel of the mode switch; 0 none.
     ModeChannel = "FLTMODE_CH", MAV_PARAM_TYPE_INT8, 5.0, 0.0..=16.0;
     /// Mode at the first position of the switch.

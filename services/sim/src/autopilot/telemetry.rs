@@ -5,15 +5,14 @@ use std::f64::consts::TAU;
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega as mav;
 use mavlink::dialects::ardupilotmega::MavMessage;
+use nalgebra::Vector3;
 
 use super::control::heading_rad;
-use super::{Autopilot, Outbound};
-use crate::copter::GRAVITY_MPS2;
+use super::guided::Guided;
+use super::{Autopilot, Mode, Outbound, Param};
 
 /// ArduCopter 4.6.0, an official release, as AUTOPILOT_VERSION writes it.
 const VERSION: u32 = 0x0406_00FF;
-/// Pressure at sea level (ISA), hectopascals.
-const SEA_LEVEL_HPA: f64 = 1013.25;
 
 impl Autopilot {
     /// Sends what is due on each link.
@@ -58,6 +57,8 @@ impl Autopilot {
             }
             mav::GPS_RAW_INT_DATA::ID => self.gps_raw(),
             mav::RAW_IMU_DATA::ID => self.raw_imu(),
+            mav::SCALED_IMU_DATA::ID => self.scaled_imu(),
+            mav::SCALED_IMU2_DATA::ID => self.scaled_imu2(),
             mav::SCALED_PRESSURE_DATA::ID => self.pressure(),
             mav::ATTITUDE_DATA::ID => self.attitude(),
             mav::ATTITUDE_QUATERNION_DATA::ID => self.attitude_quaternion(),
@@ -68,8 +69,13 @@ impl Autopilot {
             mav::MISSION_CURRENT_DATA::ID => self.mission_current(),
             mav::VFR_HUD_DATA::ID => self.hud(),
             mav::POSITION_TARGET_LOCAL_NED_DATA::ID => self.local_setpoint()?,
+            mav::POSITION_TARGET_GLOBAL_INT_DATA::ID => self.global_setpoint()?,
             mav::BATTERY_STATUS_DATA::ID => self.battery(),
-            mav::AUTOPILOT_VERSION_DATA::ID => version(),
+            mav::DISTANCE_SENSOR_DATA::ID => self.distance_sensor()?,
+            mav::RANGEFINDER_DATA::ID => self.rangefinder()?,
+            mav::FENCE_STATUS_DATA::ID => self.fence_status()?,
+            mav::RELAY_STATUS_DATA::ID => self.relay_status()?,
+            mav::AUTOPILOT_VERSION_DATA::ID => self.version(),
             mav::SIMSTATE_DATA::ID => self.simulator_state(),
             mav::EKF_STATUS_REPORT_DATA::ID => self.ekf_status(),
             mav::HOME_POSITION_DATA::ID => self.home_message()?,
@@ -79,8 +85,9 @@ impl Autopilot {
         })
     }
 
+    /// Unix time in microseconds, or 0 until GNSS has told it.
     fn unix_us(&self) -> u64 {
-        (self.now.as_nanos() / 1000).max(0) as u64
+        if self.clock_is_set { (self.now.as_nanos() / 1000).max(0) as u64 } else { 0 }
     }
 
     fn heartbeat(&self) -> MavMessage {
@@ -113,7 +120,7 @@ impl Autopilot {
 
     fn sys_status(&self) -> MavMessage {
         use mav::MavSysStatusSensor as Sensor;
-        let present = Sensor::MAV_SYS_STATUS_SENSOR_3D_GYRO
+        let mut present = Sensor::MAV_SYS_STATUS_SENSOR_3D_GYRO
             | Sensor::MAV_SYS_STATUS_SENSOR_3D_ACCEL
             | Sensor::MAV_SYS_STATUS_SENSOR_3D_MAG
             | Sensor::MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE
@@ -127,6 +134,12 @@ impl Autopilot {
             | Sensor::MAV_SYS_STATUS_AHRS
             | Sensor::MAV_SYS_STATUS_SENSOR_BATTERY
             | Sensor::MAV_SYS_STATUS_PREARM_CHECK;
+        if self.params.get(Param::RangefinderType) != 0.0 {
+            present |= Sensor::MAV_SYS_STATUS_SENSOR_LASER_POSITION;
+        }
+        if self.params.get(Param::FenceEnable) != 0.0 {
+            present |= Sensor::MAV_SYS_STATUS_GEOFENCE;
+        }
         let mut enabled = present;
         if !self.armed {
             enabled -= Sensor::MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS;
@@ -137,6 +150,12 @@ impl Autopilot {
         }
         if !self.sensed.estimate.attitude_ok {
             health -= Sensor::MAV_SYS_STATUS_AHRS;
+        }
+        if self.params.get(Param::RangefinderType) != 0.0 && self.sensed.range_m.is_none() {
+            health -= Sensor::MAV_SYS_STATUS_SENSOR_LASER_POSITION;
+        }
+        if self.fence.is_breached() {
+            health -= Sensor::MAV_SYS_STATUS_GEOFENCE;
         }
         if self.failsafe.battery_stage > 0 {
             health -= Sensor::MAV_SYS_STATUS_SENSOR_BATTERY;
@@ -152,69 +171,6 @@ impl Autopilot {
             voltage_battery: (self.sensed.battery_v * 1e3) as u16,
             current_battery: (self.sensed.battery_a * 1e2) as i16,
             battery_remaining: (self.sensed.battery_fraction * 100.0).round() as i8,
-            ..Default::default()
-        })
-    }
-
-    fn gps_raw(&self) -> MavMessage {
-        let Some(gnss) = self.sensed.gnss else {
-            return MavMessage::GPS_RAW_INT(mav::GPS_RAW_INT_DATA {
-                time_usec: self.unix_us(),
-                fix_type: mav::GpsFixType::GPS_FIX_TYPE_NO_FIX,
-                eph: u16::MAX,
-                epv: u16::MAX,
-                ..Default::default()
-            });
-        };
-        let (lat, lon, altitude_m) = self.global_e7(gnss.position_ned_m);
-        let velocity_mps = gnss.velocity_ned_mps;
-        let course_rad = velocity_mps.y.atan2(velocity_mps.x).rem_euclid(TAU);
-        let (horizontal_m, vertical_m) = self.sensed.gnss_sigma_m;
-        // Dilution of precision of a good sky: it shrinks with the satellites in use.
-        let hdop = 2.0 / f64::from(self.sensed.satellites.max(4)).sqrt();
-        MavMessage::GPS_RAW_INT(mav::GPS_RAW_INT_DATA {
-            time_usec: self.unix_us(),
-            lat,
-            lon,
-            alt: (altitude_m * 1e3) as i32,
-            eph: (hdop * 100.0) as u16,
-            epv: (hdop * 160.0) as u16,
-            vel: (velocity_mps.xy().norm() * 100.0) as u16,
-            cog: (course_rad.to_degrees() * 100.0) as u16,
-            fix_type: mav::GpsFixType::GPS_FIX_TYPE_3D_FIX,
-            satellites_visible: self.sensed.satellites,
-            alt_ellipsoid: (altitude_m * 1e3) as i32,
-            h_acc: (horizontal_m * 1e3) as u32,
-            v_acc: (vertical_m * 1e3) as u32,
-            vel_acc: 100,
-            ..Default::default()
-        })
-    }
-
-    fn raw_imu(&self) -> MavMessage {
-        // Milli-g and milliradians per second.
-        let force = self.sensed.specific_force_body_mps2 * (1e3 / GRAVITY_MPS2);
-        let rate = self.sensed.estimate.rate_body_radps * 1e3;
-        MavMessage::RAW_IMU(mav::RAW_IMU_DATA {
-            time_usec: self.unix_us(),
-            xacc: force.x as i16,
-            yacc: force.y as i16,
-            zacc: force.z as i16,
-            xgyro: rate.x as i16,
-            ygyro: rate.y as i16,
-            zgyro: rate.z as i16,
-            ..Default::default()
-        })
-    }
-
-    fn pressure(&self) -> MavMessage {
-        // The standard atmosphere below 11 km.
-        let altitude_m = self.frame.origin().altitude_m - self.sensed.estimate.position_ned_m.z;
-        let press_abs = SEA_LEVEL_HPA * (1.0 - 2.255_77e-5 * altitude_m).max(0.0).powf(5.255_88);
-        MavMessage::SCALED_PRESSURE(mav::SCALED_PRESSURE_DATA {
-            time_boot_ms: self.boot_ms(),
-            press_abs: press_abs as f32,
-            temperature: 3500,
             ..Default::default()
         })
     }
@@ -305,7 +261,7 @@ impl Autopilot {
     fn servo_outputs(&self) -> MavMessage {
         let ratio = if self.armed { self.controller.thrust_ratio() / self.airframe.thrust_to_weight } else { 0.0 };
         let motor_us = 1000 + (ratio.clamp(0.0, 1.0) * 1000.0) as u16;
-        let us = self.servos_us;
+        let us: [u16; 16] = std::array::from_fn(|index| self.servo_us(index + 1));
         MavMessage::SERVO_OUTPUT_RAW(mav::SERVO_OUTPUT_RAW_DATA {
             time_usec: self.boot_ms().wrapping_mul(1000),
             servo1_raw: motor_us,
@@ -361,9 +317,21 @@ impl Autopilot {
         })
     }
 
+    /// GUIDED's target as it was given, in the filter's own frame; no other mode has one.
     fn local_setpoint(&self) -> Option<MavMessage> {
-        let place_m = self.controller.desired_position_m() - self.origin_ned_m?;
-        let velocity_mps = self.controller.desired_velocity_mps();
+        let none = Vector3::zeros();
+        let here_m = self.controller.desired_position_m();
+        // Which of position, velocity and acceleration are not said; heading never is.
+        const YAW: u16 = 0o6000;
+        let (ignored, place_m, velocity_mps, acceleration_mps2) = match self.guided {
+            _ if self.mode != Mode::Guided => return None,
+            Guided::Hold => (0o7, none, none, none),
+            Guided::TakeOff { down_m } => (0o770, Vector3::new(here_m.x, here_m.y, down_m), none, none),
+            Guided::Position { ned_m } => (0o770, ned_m, none, none),
+            Guided::Velocity { velocity_mps, acceleration_mps2, .. } => (0o7, none, velocity_mps, acceleration_mps2),
+            Guided::Moving { ned_m, velocity_mps, acceleration_mps2, .. } => (0, ned_m, velocity_mps, acceleration_mps2),
+        };
+        let place_m = if ignored & 0o7 == 0 { place_m - self.origin_ned_m? } else { none };
         Some(MavMessage::POSITION_TARGET_LOCAL_NED(mav::POSITION_TARGET_LOCAL_NED_DATA {
             time_boot_ms: self.boot_ms(),
             x: place_m.x as f32,
@@ -372,8 +340,29 @@ impl Autopilot {
             vx: velocity_mps.x as f32,
             vy: velocity_mps.y as f32,
             vz: velocity_mps.z as f32,
-            type_mask: mav::PositionTargetTypemask::from_bits_retain(0o700 | 0o6000),
+            afx: acceleration_mps2.x as f32,
+            afy: acceleration_mps2.y as f32,
+            afz: acceleration_mps2.z as f32,
+            type_mask: mav::PositionTargetTypemask::from_bits_retain(ignored | YAW),
             coordinate_frame: mav::MavFrame::MAV_FRAME_LOCAL_NED,
+            ..Default::default()
+        }))
+    }
+
+    /// Where GUIDED is going, on the map, while it goes to a place at rest.
+    fn global_setpoint(&self) -> Option<MavMessage> {
+        let ned_m = match self.guided {
+            Guided::Position { ned_m } if self.mode == Mode::Guided => ned_m,
+            _ => return None,
+        };
+        let (lat_int, lon_int, altitude_m) = self.global_e7(ned_m);
+        Some(MavMessage::POSITION_TARGET_GLOBAL_INT(mav::POSITION_TARGET_GLOBAL_INT_DATA {
+            time_boot_ms: self.boot_ms(),
+            lat_int,
+            lon_int,
+            alt: altitude_m as f32,
+            type_mask: mav::PositionTargetTypemask::from_bits_retain(0xFFF8),
+            coordinate_frame: mav::MavFrame::MAV_FRAME_GLOBAL,
             ..Default::default()
         }))
     }
@@ -460,7 +449,7 @@ impl Autopilot {
             y: local_m.y as f32,
             z: local_m.z as f32,
             q: [1.0, 0.0, 0.0, 0.0],
-            time_usec: self.unix_us(),
+            time_usec: self.boot_us(),
             ..Default::default()
         }))
     }
@@ -471,7 +460,7 @@ impl Autopilot {
             latitude,
             longitude,
             altitude: (altitude_m * 1e3).round() as i32,
-            time_usec: self.unix_us(),
+            time_usec: self.boot_us(),
         }))
     }
 
@@ -493,20 +482,28 @@ impl Autopilot {
             landed_state,
         })
     }
-}
 
-fn version() -> MavMessage {
-    use mav::MavProtocolCapability as Can;
-    MavMessage::AUTOPILOT_VERSION(mav::AUTOPILOT_VERSION_DATA {
-        capabilities: Can::MAV_PROTOCOL_CAPABILITY_MISSION_INT
-            | Can::MAV_PROTOCOL_CAPABILITY_COMMAND_INT
-            | Can::MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT
-            | Can::MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST
-            | Can::MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
-            | Can::MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
-            | Can::MAV_PROTOCOL_CAPABILITY_FLIGHT_TERMINATION
-            | Can::MAV_PROTOCOL_CAPABILITY_MAVLINK2,
-        flight_sw_version: VERSION,
-        ..Default::default()
-    })
+    fn version(&self) -> MavMessage {
+        use mav::MavProtocolCapability as Can;
+        let mut uid2 = [0; 18];
+        uid2[..10].copy_from_slice(b"HALCYONSIM");
+        uid2[17] = self.system_id();
+        MavMessage::AUTOPILOT_VERSION(mav::AUTOPILOT_VERSION_DATA {
+            capabilities: Can::MAV_PROTOCOL_CAPABILITY_MISSION_INT
+                | Can::MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+                | Can::MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT
+                | Can::MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST
+                | Can::MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
+                | Can::MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
+                | Can::MAV_PROTOCOL_CAPABILITY_FLIGHT_TERMINATION
+                | Can::MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
+                | Can::MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
+                | Can::MAV_PROTOCOL_CAPABILITY_MAVLINK2,
+            flight_sw_version: VERSION,
+            flight_custom_version: *b"halcyon0",
+            uid: u64::from(self.system_id()),
+            uid2,
+            ..Default::default()
+        })
+    }
 }

@@ -4,6 +4,8 @@ use mavlink::dialects::ardupilotmega::MavMessage;
 use mavlink::error::ParserError;
 use mavlink::{MAVLinkMessageRaw, MAVLinkV1MessageRaw, MAVLinkV2MessageRaw, MavHeader, MavlinkVersion, Message, MessageData};
 
+use super::signing::{SIGNED, Signing};
+
 /// Ids of COMMAND_INT and COMMAND_LONG, and where both keep the command's number, its target system and component.
 const COMMAND_IDS: [u32; 2] = [75, 76];
 const COMMAND_OFFSET: usize = 28;
@@ -58,8 +60,8 @@ impl Inbound {
 pub enum Outbound {
     /// A message of the dialect.
     Message(MavMessage),
-    /// "Unsupported", to a command whose number the dialect does not know.
-    Unsupported(UnknownCommandAck),
+    /// An answer to a number that the dialect knows as no command.
+    Acknowledgement(UnlistedAck),
 }
 
 impl Outbound {
@@ -68,18 +70,36 @@ impl Outbound {
     pub fn message_id(&self) -> u32 {
         match self {
             Self::Message(message) => message.message_id(),
-            Self::Unsupported(_) => UnknownCommandAck::ID,
+            Self::Acknowledgement(_) => UnlistedAck::ID,
         }
     }
 
     /// Appends the frame to `bytes`. A message that MAVLink 1 can't carry is left out of a version 1 stream.
     pub fn encode(&self, version: MavlinkVersion, header: MavHeader, bytes: &mut Vec<u8>) {
+        self.encode_signed(version, header, None, bytes);
+    }
+
+    /// The same, signed where the version allows it, as the link of that number.
+    pub(super) fn encode_signed(
+        &self,
+        version: MavlinkVersion,
+        header: MavHeader,
+        signing: Option<(&mut Signing, u8)>,
+        bytes: &mut Vec<u8>,
+    ) {
         match version {
             MavlinkVersion::V2 => {
                 let mut frame = MAVLinkV2MessageRaw::new();
-                match self {
-                    Self::Message(message) => frame.serialize_message(header, message),
-                    Self::Unsupported(ack) => frame.serialize_message_data(header, ack),
+                match (self, signing.is_some()) {
+                    (Self::Message(message), false) => frame.serialize_message(header, message),
+                    (Self::Message(message), true) => frame.serialize_message_for_signing(header, message),
+                    (Self::Acknowledgement(ack), signed) => {
+                        *frame.incompatibility_flags_mut() = if signed { SIGNED } else { 0 };
+                        frame.serialize_message_data(header, ack);
+                    }
+                }
+                if let Some((signing, link_id)) = signing {
+                    signing.sign(&mut frame, link_id);
                 }
                 bytes.extend_from_slice(frame.raw_bytes());
             }
@@ -87,7 +107,7 @@ impl Outbound {
                 let mut frame = MAVLinkV1MessageRaw::new();
                 match self {
                     Self::Message(message) => frame.serialize_message(header, message),
-                    Self::Unsupported(ack) => frame.serialize_message_data(header, ack),
+                    Self::Acknowledgement(ack) => frame.serialize_message_data(header, ack),
                 }
                 bytes.extend_from_slice(frame.raw_bytes());
             }
@@ -96,18 +116,20 @@ impl Outbound {
     }
 }
 
-/// A COMMAND_ACK of MAV_RESULT_UNSUPPORTED for any number: the dialect's own can only name commands that it knows.
+/// A COMMAND_ACK for any number: the dialect's own can only name commands that it knows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct UnknownCommandAck {
+pub struct UnlistedAck {
     /// The command's number.
     pub command: u16,
+    /// What became of it, a MAV_RESULT.
+    pub result: u8,
     /// Who asked.
     pub target_system: u8,
     /// Which component of theirs.
     pub target_component: u8,
 }
 
-impl MessageData for UnknownCommandAck {
+impl MessageData for UnlistedAck {
     type Message = MavMessage;
     const ID: u32 = 77;
     const NAME: &'static str = "COMMAND_ACK";
@@ -116,8 +138,7 @@ impl MessageData for UnknownCommandAck {
 
     fn ser(&self, version: MavlinkVersion, payload: &mut [u8]) -> usize {
         let [low, high] = self.command.to_le_bytes();
-        let unsupported = 3;
-        let all = [low, high, unsupported, 0, 0, 0, 0, 0, self.target_system, self.target_component];
+        let all = [low, high, self.result, 0, 0, 0, 0, 0, self.target_system, self.target_component];
         let length = match version {
             MavlinkVersion::V1 => 3,
             MavlinkVersion::V2 => all.len() - all.iter().rev().take_while(|byte| **byte == 0).count(),
@@ -128,7 +149,8 @@ impl MessageData for UnknownCommandAck {
 
     fn deser(_: MavlinkVersion, payload: &[u8]) -> Result<Self, ParserError> {
         let byte = |offset: usize| payload.get(offset).copied().unwrap_or(0);
-        Ok(Self { command: u16::from_le_bytes([byte(0), byte(1)]), target_system: byte(8), target_component: byte(9) })
+        let command = u16::from_le_bytes([byte(0), byte(1)]);
+        Ok(Self { command, result: byte(2), target_system: byte(8), target_component: byte(9) })
     }
 }
 
@@ -141,7 +163,7 @@ mod tests {
     #[test]
     fn an_unsupported_answer_is_a_command_ack() {
         let header = MavHeader { system_id: 3, component_id: 1, sequence: 9 };
-        let own = UnknownCommandAck { command: 22, target_system: 255, target_component: 190 };
+        let own = UnlistedAck { command: 22, result: 3, target_system: 255, target_component: 190 };
         let theirs = mav::COMMAND_ACK_DATA {
             command: mav::MavCmd::MAV_CMD_NAV_TAKEOFF,
             result: mav::MavResult::MAV_RESULT_UNSUPPORTED,
@@ -152,7 +174,7 @@ mod tests {
         };
         for version in [MavlinkVersion::V1, MavlinkVersion::V2] {
             let (mut a, mut b) = (Vec::new(), Vec::new());
-            Outbound::Unsupported(own).encode(version, header, &mut a);
+            Outbound::Acknowledgement(own).encode(version, header, &mut a);
             Outbound::Message(MavMessage::COMMAND_ACK(theirs.clone())).encode(version, header, &mut b);
             assert_eq!(a, b);
             assert!(!a.is_empty());

@@ -10,8 +10,10 @@ use mavlink::dialects::ardupilotmega as ardu;
 use mavlink::dialects::ardupilotmega::{MavCmd, MavMessage, MavResult};
 
 use super::encode::Address;
+use super::payload::PayloadCommand;
 use super::streams::Stream;
 use super::text::Texts;
+use super::transfers::Ending;
 
 /// An answer is awaited for so long before the command is sent again, seconds.
 const RETRY_S: f64 = 1.0;
@@ -46,6 +48,8 @@ pub enum Command {
     },
     /// Send a message at an interval.
     SetInterval(Stream),
+    /// Open or close what holds the payload.
+    Payload(PayloadCommand),
 }
 
 /// Who asked, to give the outcome back to; the caller's own number.
@@ -63,10 +67,12 @@ pub enum CommandError {
         words: Option<String>,
     },
     /// It didn't answer.
-    #[error("the autopilot did not answer {tries} tries")]
+    #[error("the autopilot did not answer {tries} tries{}", .percent.map(|percent| format!(", {percent} % done")).unwrap_or_default())]
     TimedOut {
         /// How often it was sent.
         tries: u8,
+        /// How far it said that it was, percent.
+        percent: Option<u8>,
     },
     /// Too many commands are under way.
     #[error("{OPEN_MAX} commands are under way already")]
@@ -93,6 +99,8 @@ pub enum Effect {
     Send(MavMessage),
     /// A command ended.
     Done(Ticket, Command, Result<(), CommandError>),
+    /// A transfer ended.
+    Transferred(Ticket, Ending),
 }
 
 #[derive(Debug, Clone)]
@@ -103,6 +111,7 @@ struct Transaction {
     started: Option<Stamp>,
     tries: u8,
     as_int: bool,
+    percent: Option<u8>,
     /// The next acknowledgement may be of what this overtook.
     skips_ack: bool,
 }
@@ -151,6 +160,7 @@ impl Commands {
             started: None,
             tries: 0,
             as_int: false,
+            percent: None,
             skips_ack,
         });
         Ok(())
@@ -186,7 +196,11 @@ impl Commands {
         }
         open.phase = match ack.result {
             MavResult::MAV_RESULT_ACCEPTED => Phase::Accepted,
-            MavResult::MAV_RESULT_IN_PROGRESS => Phase::InProgress { until: now.plus_secs_f64(PROGRESS_S) },
+            MavResult::MAV_RESULT_IN_PROGRESS => {
+                // 255: not known.
+                open.percent = Some(ack.progress).filter(|percent| *percent <= 100).or(open.percent);
+                Phase::InProgress { until: now.plus_secs_f64(PROGRESS_S) }
+            }
             MavResult::MAV_RESULT_COMMAND_INT_ONLY if !open.as_int => {
                 open.as_int = true;
                 Phase::Sent { until: now }
@@ -215,14 +229,16 @@ impl Commands {
     }
 
     /// Stops sending whatever would change mode or motors: the vehicle went into `mode`, which guidance didn't ask for. If a
-    /// person asked for it here, that was done, whether or not the acknowledgement has come.
-    pub fn withdraw(&mut self, mode: Option<FlightMode>) -> Vec<Effect> {
+    /// person asked for it here, that was done, whether or not the acknowledgement has come. What the autopilot `to` is at work on
+    /// is cancelled there, too.
+    pub fn withdraw(&mut self, to: Option<Address>, mode: Option<FlightMode>) -> Vec<Effect> {
         let mut ended = Vec::new();
         self.open.retain(|open| {
             // A person's termination stands: whoever has the vehicle, its motors are to stop.
             let terminates = open.ticket != 0 && open.command == Command::Disarm { force: true };
             let keep = terminates || matches!(open.command, Command::SetInterval(_));
             if !keep {
+                ended.extend(to.and_then(|to| open.cancellation(to)).map(Effect::Send));
                 let reached = mode.is_some_and(|mode| open.command == Command::SetMode(mode));
                 let outcome = if reached { Ok(()) } else { open.cut_short(CommandError::Withdrawn) };
                 ended.push(Effect::Done(open.ticket, open.command, outcome));
@@ -240,6 +256,17 @@ impl Commands {
 }
 
 impl Transaction {
+    /// What stops the autopilot, if it said that it is at work on this.
+    fn cancellation(&self, to: Address) -> Option<MavMessage> {
+        matches!(self.phase, Phase::InProgress { .. }).then(|| {
+            MavMessage::COMMAND_CANCEL(ardu::COMMAND_CANCEL_DATA {
+                command: self.command.id(),
+                target_system: to.system(),
+                target_component: to.component(),
+            })
+        })
+    }
+
     /// The outcome if it ends now, because of `error`.
     fn cut_short(&self, error: CommandError) -> Result<(), CommandError> {
         if matches!(self.phase, Phase::Accepted) { Ok(()) } else { Err(error) }
@@ -253,10 +280,10 @@ impl Transaction {
             Phase::Refused { until, .. } if now < until => return true,
             Phase::Refused { result, .. } => Err(CommandError::Refused { result, words: self.explanation(texts, now) }),
             _ if self.started.is_some_and(|started| now.seconds_since(started) > PROGRESS_S_MAX) => {
-                Err(CommandError::TimedOut { tries: self.tries })
+                Err(CommandError::TimedOut { tries: self.tries, percent: self.percent })
             }
             Phase::Sent { until } | Phase::InProgress { until } if now < until => return true,
-            _ if self.tries >= TRIES => Err(CommandError::TimedOut { tries: self.tries }),
+            _ if self.tries >= TRIES => Err(CommandError::TimedOut { tries: self.tries, percent: self.percent }),
             Phase::Waiting | Phase::Sent { .. } | Phase::InProgress { .. } => {
                 effects.push(Effect::Send(self.command.message(to, self.tries, self.as_int)));
                 self.tries += 1;
@@ -288,6 +315,7 @@ impl Command {
             Self::SetMode(_) => MavCmd::MAV_CMD_DO_SET_MODE,
             Self::TakeOff { .. } => MavCmd::MAV_CMD_NAV_TAKEOFF,
             Self::SetInterval(_) => MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL,
+            Self::Payload(payload) => payload.id,
         }
     }
 
@@ -301,6 +329,7 @@ impl Command {
             // 1: MAV_MODE_FLAG_CUSTOM_MODE_ENABLED.
             Self::SetMode(mode) => [1.0, mode.copter_number() as f32, 0.0, 0.0, 0.0, 0.0, 0.0],
             Self::TakeOff { height_above_home_m } => [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, height_above_home_m as f32],
+            Self::Payload(PayloadCommand { parameters: [first, second], .. }) => [first, second, 0.0, 0.0, 0.0, 0.0, 0.0],
             Self::SetInterval(stream) => [stream.message_id as f32, stream.interval_us as f32, 0.0, 0.0, 0.0, 0.0, 0.0],
         }
     }
@@ -397,7 +426,7 @@ mod tests {
             }));
         }
         assert_eq!(seen, [0, 1, 2, 3]);
-        assert_eq!(outcome, Some((40, Err(CommandError::TimedOut { tries: 4 }))));
+        assert_eq!(outcome, Some((40, Err(CommandError::TimedOut { tries: 4, percent: None }))));
     }
 
     #[test]
@@ -505,12 +534,43 @@ mod tests {
                 let ack = ack(MavCmd::MAV_CMD_DO_SET_MODE, MavResult::MAV_RESULT_ACCEPTED, OWN);
                 commands.observe_ack(&ack, OWN.0, OWN.1, t(0.1));
             }
-            let [Effect::Done(5, _, outcome)] = &commands.withdraw(Some(mode))[..] else { panic!("no outcome") };
+            let [Effect::Done(5, _, outcome)] = &commands.withdraw(None, Some(mode))[..] else { panic!("no outcome") };
             outcome.clone()
         };
         assert_eq!(asked(true, FlightMode::Loiter), Ok(()));
         assert_eq!(asked(false, FlightMode::Loiter), Ok(()));
         assert_eq!(asked(false, FlightMode::Stabilize), Err(CommandError::Withdrawn));
+    }
+
+    /// MAVLink: progress 0 to 100, 255 if not known; COMMAND_CANCEL names the command and its target.
+    #[test]
+    fn what_is_in_progress_is_cancelled_when_it_is_withdrawn_and_tells_how_far_it_was() {
+        let takeoff = Command::TakeOff { height_above_home_m: 5.0 };
+        let id = MavCmd::MAV_CMD_NAV_TAKEOFF;
+        let progress = |percent| ardu::COMMAND_ACK_DATA { progress: percent, ..ack(id, MavResult::MAV_RESULT_IN_PROGRESS, OWN) };
+        let begun = || {
+            let mut commands = Commands::default();
+            commands.submit(1, takeoff).unwrap();
+            commands.poll(to(), &Texts::default(), t(0.0));
+            commands
+        };
+        let mut commands = begun();
+        assert!(matches!(commands.withdraw(Some(to()), None)[..], [Effect::Done(1, _, Err(CommandError::Withdrawn))]));
+        let mut commands = begun();
+        commands.observe_ack(&progress(40), OWN.0, OWN.1, t(0.1));
+        commands.observe_ack(&progress(255), OWN.0, OWN.1, t(0.2));
+        let effects = commands.withdraw(Some(to()), None);
+        let [Effect::Send(MavMessage::COMMAND_CANCEL(data)), Effect::Done(1, _, Err(CommandError::Withdrawn))] = &effects[..]
+        else {
+            panic!("{effects:?}")
+        };
+        assert_eq!((data.command, data.target_system, data.target_component), (id, 7, 1));
+        let mut commands = begun();
+        commands.observe_ack(&progress(40), OWN.0, OWN.1, t(0.1));
+        let outcomes = (0..300).flat_map(|step| commands.poll(to(), &Texts::default(), t(f64::from(step) * 0.1)));
+        let outcome = outcomes.filter_map(|effect| if let Effect::Done(_, _, outcome) = effect { Some(outcome) } else { None });
+        let errors: Vec<_> = outcome.filter_map(Result::err).map(|error| error.to_string()).collect();
+        assert_eq!(errors, ["the autopilot did not answer 4 tries, 40 % done"]);
     }
 
     #[test]

@@ -5,7 +5,7 @@
 
 use nalgebra::Vector3;
 
-use halcyon_model::Slot;
+use halcyon_model::{Intent, Slot, Stamp};
 use serde::{Deserialize, Serialize};
 
 use super::inverse::Loops;
@@ -31,6 +31,17 @@ impl Setpoint {
     #[must_use]
     pub fn height_m(&self) -> f64 {
         -self.position_ned_m.z
+    }
+
+    /// For those who follow.
+    #[must_use]
+    pub fn intent(&self, stamp: Stamp) -> Intent {
+        Intent {
+            stamp,
+            position_ned_m: self.position_ned_m,
+            velocity_ned_mps: self.velocity_ned_mps,
+            acceleration_ned_mps2: self.acceleration_ned_mps2.unwrap_or_default(),
+        }
     }
 }
 

@@ -23,13 +23,21 @@ const REACTION_S: f64 = 0.6;
 const OPENING_HZ: f64 = 1.0;
 /// Speed at which it is restored at most, relative to the obstacle, metres per second.
 const OPENING_MPS_MAX: f64 = 2.0;
+/// How an autopilot goes after a reference that is ahead of it, 1/s: ArduCopter's PSC_POSXY_P.
+const CHASE_HZ: f64 = 1.0;
 /// A silent vehicle may have gone anywhere: its kept distance grows by this much a second, up to [`GROWTH_M_MAX`].
 const GROWTH_MPS: f64 = 0.5;
 const GROWTH_M_MAX: f64 = 3.0;
 /// A flying vehicle of which nothing has come for so long is forgotten, seconds; a parked one stays where it was.
 const FORGET_S: f64 = 30.0;
-/// Projections over all constraints; a handful of vehicles converges in two or three.
-const PASSES: usize = 8;
+/// Passes over all constraints; a handful of vehicles needs two or three, ten in a crowd some dozen.
+const PASSES: usize = 60;
+/// What is refused by less than this is kept, metres per second.
+const KEPT_MPS: f64 = 1e-9;
+/// And what is still refused by more than this after all passes can't be kept, metres per second.
+const REFUSED_MPS: f64 = 0.05;
+/// Where not everything can be kept, how easily a constraint gives at its kept distance. Nearer it gives less.
+const GIVE: f64 = 0.5;
 
 /// Something to stay clear of.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,7 +57,7 @@ pub struct Obstacle {
 pub fn obstacle(track: &Track, own_follows: bool, limits: &Limits, now: Stamp) -> Option<Obstacle> {
     let silent_s = track.silent_s(now);
     if track.parked() {
-        let position_ned_m = track.state.position_ned_m;
+        let position_ned_m = track.place_ned_m();
         let keep_m = limits.separation_parked_m;
         return Some(Obstacle { position_ned_m, velocity_ned_mps: Vector3::zeros(), keep_m, yields_beyond_m: None });
     }
@@ -84,6 +92,8 @@ struct Constraint {
     normal: Vector3<f64>,
     push: Vector3<f64>,
     bound_mps: f64,
+    /// How easily it gives where not everything can be kept.
+    give: f64,
 }
 
 fn constraint(point_ned_m: Vector3<f64>, obstacle: &Obstacle) -> Constraint {
@@ -104,7 +114,38 @@ fn constraint(point_ned_m: Vector3<f64>, obstacle: &Obstacle) -> Constraint {
     } else {
         Vector3::x()
     };
-    Constraint { normal, push, bound_mps }
+    let give = GIVE * (distance_m / obstacle.keep_m.max(1e-3)).powi(2);
+    Constraint { normal, push, bound_mps, give }
+}
+
+/// The velocity nearest to `wanted` that keeps every constraint: Hildreth's method, which presses each constraint by as much as it
+/// needs and lets go where another's pressure has made its own needless. Where they contradict each other, the one that breaks
+/// them least by their squares, those of near obstacles counting more.
+fn resolve(wanted_ned_mps: Vector3<f64>, constraints: &[Constraint]) -> Vector3<f64> {
+    let refused_mps =
+        |velocity: Vector3<f64>| constraints.iter().map(|one| one.bound_mps - one.normal.dot(&velocity)).fold(0.0, f64::max);
+    let exact = pressed(wanted_ned_mps, constraints, 0.0);
+    if refused_mps(exact) <= REFUSED_MPS { exact } else { pressed(wanted_ned_mps, constraints, 1.0) }
+}
+
+fn pressed(wanted_ned_mps: Vector3<f64>, constraints: &[Constraint], softness: f64) -> Vector3<f64> {
+    let mut velocity = wanted_ned_mps;
+    let mut pressures_mps = vec![0.0; constraints.len()];
+    for _ in 0..PASSES {
+        let mut change_mps = 0.0;
+        for (one, pressure_mps) in constraints.iter().zip(&mut pressures_mps) {
+            let give = softness * one.give;
+            let refused_mps = one.bound_mps - one.normal.dot(&velocity) - give * *pressure_mps;
+            let pressed_mps = f64::max(*pressure_mps + refused_mps / (one.normal.dot(&one.push).max(0.2) + give), 0.0);
+            velocity += one.push * (pressed_mps - *pressure_mps);
+            change_mps += (pressed_mps - *pressure_mps).abs();
+            *pressure_mps = pressed_mps;
+        }
+        if change_mps <= KEPT_MPS {
+            break;
+        }
+    }
+    velocity
 }
 
 /// A way round an obstacle that stands between `own` and `goal`: the tangential unit vector, or `None` if the way is free or
@@ -158,24 +199,17 @@ pub fn filter(
             }
         }
     }
-    for _ in 0..PASSES {
-        let mut kept = true;
-        for obstacle in obstacles {
-            for point in points_ned_m {
-                let Constraint { normal, push, bound_mps } = constraint(point, obstacle);
-                let refused_mps = bound_mps - normal.dot(&velocity);
-                if refused_mps > 1e-9 {
-                    kept = false;
-                    // Along `push`, by as much as brings the component along `normal` up to the bound.
-                    velocity += push * (refused_mps / normal.dot(&push).max(0.2));
-                }
-            }
-        }
-        if kept {
-            break;
-        }
-    }
-    velocity
+    let lead_m = points_ned_m[1] - points_ned_m[0];
+    let pairs = obstacles.iter().flat_map(|obstacle| {
+        let [mut own, reference] = points_ned_m.map(|point| constraint(point, obstacle));
+        // The autopilot flies after its reference by this much faster than it is asked to.
+        own.bound_mps += (-own.normal.dot(&lead_m) * CHASE_HZ).max(0.0);
+        [own, reference]
+    });
+    // Most are far off, and can't be broken by any speed that is flown.
+    let fast_mps = velocity.norm().max(2.0 * limits.speed_mps_max);
+    let constraints: Vec<Constraint> = pairs.filter(|one| one.bound_mps > -fast_mps).collect();
+    resolve(velocity, &constraints)
 }
 
 #[cfg(test)]
@@ -229,5 +263,68 @@ mod tests {
         let below = Vector3::new(0.1, 0.0, -5.0);
         let aside = filter(Vector3::zeros(), [below, below], below, &[still(0.0, 0.0, -8.0)], &limits);
         assert!(aside.z.abs() < 1e-9 && aside.x > 0.5, "{aside}");
+    }
+
+    /// In a crowd that leaves a way: everybody's distance is kept, and of thousands of velocities that keep it none is nearer to
+    /// the wanted one.
+    #[test]
+    fn of_all_velocities_that_keep_every_distance_the_nearest_is_taken() {
+        let limits = Limits::default();
+        let mut tried = 0;
+        for case in 0..300u32 {
+            let angle = |index: u32| f64::from(case * 7 + index * index * 13 + index);
+            let places = (0..9).map(|index| {
+                let distance_m = 5.2 + f64::from((case + 3 * index) % 5);
+                Vector3::new(angle(index).cos() * distance_m, angle(index).sin() * distance_m, -5.0)
+            });
+            let crowd: Vec<Obstacle> = places
+                .map(|place| Obstacle {
+                    velocity_ned_mps: Vector3::new(angle(case % 7).sin(), angle(case % 5).cos(), 0.0),
+                    ..still(place.x, place.y, place.z)
+                })
+                .collect();
+            let own = Vector3::new(0.0, 0.0, -5.0);
+            let wanted = Vector3::new(angle(case).cos(), angle(case).sin(), 0.0) * 3.0;
+            let keeps = |velocity: Vector3<f64>, slack_mps: f64| {
+                crowd.iter().all(|obstacle| {
+                    let away = (own - obstacle.position_ned_m).normalize();
+                    let gap_m = (own - obstacle.position_ned_m).norm() - obstacle.keep_m;
+                    away.dot(&(velocity - obstacle.velocity_ned_mps)) >= opening_mps_min(gap_m) - slack_mps
+                })
+            };
+            let nearest = (0..160i32)
+                .flat_map(|x| (0..160i32).map(move |y| Vector3::new(0.05 * f64::from(x - 80), 0.05 * f64::from(y - 80), 0.0)))
+                .filter(|velocity| keeps(*velocity, 0.0))
+                .map(|velocity| (velocity - wanted).norm())
+                .fold(f64::INFINITY, f64::min);
+            if nearest > 10.0 {
+                continue;
+            }
+            tried += 1;
+            // The goal lies where it stands, so that there is nothing to go round.
+            let velocity = filter(wanted, [own, own], own, &crowd, &limits);
+            assert!(keeps(velocity, REFUSED_MPS + 1e-6), "{case}: {velocity}");
+            assert!((velocity - wanted).norm() <= nearest + 1e-6, "{case}: {velocity}, {nearest}");
+        }
+        assert!(tried > 100, "{tried}");
+    }
+
+    /// Between two that both stand too near nothing can be kept: it makes for the middle, and stays there.
+    #[test]
+    fn squeezed_between_two_it_makes_for_the_middle_and_in_a_ring_it_stands_still() {
+        let limits = Limits::default();
+        let between = |east_m: f64| {
+            let own = Vector3::new(0.0, east_m, -5.0);
+            filter(Vector3::zeros(), [own, own], own, &[still(0.0, -3.0, -5.0), still(0.0, 3.0, -5.0)], &limits)
+        };
+        assert!(between(0.0).norm() < 1e-3, "{}", between(0.0));
+        assert!(between(1.0).y < -0.2 && between(-1.0).y > 0.2, "{} {}", between(1.0), between(-1.0));
+        let own = Vector3::new(0.0, 0.0, -5.0);
+        let ring: Vec<Obstacle> = (0..9)
+            .map(|index| (f64::from(index) * std::f64::consts::TAU / 9.0).sin_cos())
+            .map(|(sin, cos)| still(4.0 * cos, 4.0 * sin, -5.0))
+            .collect();
+        let velocity = filter(Vector3::new(0.0, 0.0, 0.0), [own, own], own, &ring, &limits);
+        assert!(velocity.norm() < 0.05, "{velocity}");
     }
 }

@@ -5,6 +5,8 @@ use std::f64::consts::PI;
 use halcyon_model::{FlightMode, Stamp, VehicleState};
 use nalgebra::Vector3;
 
+use super::continuity::Continuity;
+use super::intent;
 use super::observer::{LEAN_S, Observer};
 
 /// Time constant of the acceleration and yaw-rate filters, seconds: long enough to calm 10 Hz differences.
@@ -31,6 +33,7 @@ pub struct Track {
     /// When the vehicle last said anything, the same again included.
     heard: Stamp,
     observer: Observer,
+    continuity: Continuity,
     /// By filtered differences: what the plain law goes by.
     acceleration_ned_mps2: Vector3<f64>,
     yaw_rate_radps: f64,
@@ -58,7 +61,10 @@ impl Track {
     #[must_use]
     pub fn new(state: VehicleState, now: Stamp) -> Self {
         let observer = Observer::new(&state);
-        Self { state, received: now, heard: now, observer, acceleration_ned_mps2: Vector3::zeros(), yaw_rate_radps: 0.0 }
+        let mut continuity = Continuity::default();
+        continuity.observe(state.stamp, state.position_ned_m, state.velocity_ned_mps);
+        let none = Vector3::zeros();
+        Self { state, received: now, heard: now, observer, continuity, acceleration_ned_mps2: none, yaw_rate_radps: 0.0 }
     }
 
     /// Whether a state can be that of a vehicle at all: what isn't is not taken, so that it never reaches a setpoint.
@@ -83,6 +89,7 @@ impl Track {
         if dt_s == 0.0 {
             return;
         }
+        self.continuity.observe(state.stamp, state.position_ned_m, state.velocity_ned_mps);
         if (0.0..PREDICTION_S_MAX).contains(&dt_s) {
             let gain = dt_s / (FILTER_S + dt_s);
             let acceleration = (state.velocity_ned_mps - self.state.velocity_ned_mps) / dt_s;
@@ -116,17 +123,23 @@ impl Track {
         now.seconds_since(self.state.stamp).max(now.seconds_since(self.received)).max(0.0)
     }
 
-    /// Predicted `ahead_s` after `now`, at most one second from the stamp: its acceleration goes on, its jerk dies away as a lean
-    /// settles, its turn goes on.
+    /// Where it was at its stamp, metres; without leaps of its receiver.
+    #[must_use]
+    pub fn place_ned_m(&self) -> Vector3<f64> {
+        self.state.position_ned_m - self.continuity.shift_ned_m()
+    }
+
+    /// Predicted `ahead_s` after `now`, at most one second from the stamp. Where it has said where it means to be, it goes there as
+    /// its autopilot would; else its acceleration goes on and its jerk dies away as a lean settles. Its turn goes on.
     #[must_use]
     pub fn predict(&self, now: Stamp, ahead_s: f64) -> Motion {
-        let jerk_ned_mps3 = self.observer.jerk_ned_mps3();
-        self.carried_on(
-            self.age_s(now, ahead_s),
-            self.observer.acceleration_ned_mps2(),
-            jerk_ned_mps3,
-            self.observer.yaw_rate_radps(),
-        )
+        let age_s = self.age_s(now, ahead_s);
+        let (acceleration, jerk) = (self.observer.acceleration_ned_mps2(), self.observer.jerk_ned_mps3());
+        let carried_on = |dt_s: f64| self.carried_on(dt_s, acceleration, jerk, self.observer.yaw_rate_radps());
+        match intent::plausible(&self.state) {
+            Some(intent) => intent::carried_on(&self.state, &carried_on(0.0), intent, age_s),
+            None => carried_on(age_s),
+        }
     }
 
     /// The same with the acceleration and the yaw rate that filtered differences give, for the plain law.
@@ -153,7 +166,7 @@ impl Track {
         let thrice_s3 = LEAN_S * (0.5 * dt_s * dt_s - twice_s2);
         let state = &self.state;
         Motion {
-            position_ned_m: state.position_ned_m
+            position_ned_m: self.place_ned_m()
                 + state.velocity_ned_mps * dt_s
                 + acceleration * (0.5 * dt_s * dt_s)
                 + jerk * thrice_s3,

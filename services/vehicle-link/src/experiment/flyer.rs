@@ -48,7 +48,7 @@ impl Craft {
             .take_outbox()
             .filter_map(|(_, outbound)| match outbound {
                 Outbound::Message(message) => Some(message),
-                Outbound::Unsupported(_) => None,
+                Outbound::Acknowledgement(_) => None,
             })
             .collect();
         for message in said {
@@ -98,12 +98,13 @@ impl Sighting {
 pub(super) struct Leader {
     craft: Craft,
     pilot: Pilot,
+    shares_intent: bool,
 }
 
 impl Leader {
     pub(super) fn new(scenario: &Scenario, now: Stamp) -> Result<Self, String> {
         let (craft, _) = Craft::new(scenario, 0, now)?;
-        Ok(Self { craft, pilot: Pilot::new(scenario.flight) })
+        Ok(Self { craft, pilot: Pilot::new(scenario.flight), shares_intent: scenario.shares_intent })
     }
 
     pub(super) fn craft(&self) -> &Craft {
@@ -115,7 +116,9 @@ impl Leader {
     }
 
     pub(super) fn state(&self, now: Stamp) -> Option<VehicleState> {
-        self.craft.link.state(now).map(|(state, _)| state)
+        let (mut state, _) = self.craft.link.state(now)?;
+        state.intent = self.pilot.intent().filter(|_| self.shares_intent);
+        Some(state)
     }
 
     pub(super) fn airborne(&self) -> bool {
@@ -153,6 +156,7 @@ impl Follower {
             limits,
             fail_safe: config.fail_safe,
             guidance: crate::core::guidance::Guidance { law: scenario.law, slot_lock: scenario.slot_lock, ..config.guidance },
+            payload: config.payload,
             home_height_m: config.home_height_m,
             frame: FleetOrigin(Geodetic::from_deg(53.1, -2.9, 40.0)).frame(),
         });

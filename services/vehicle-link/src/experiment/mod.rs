@@ -9,10 +9,12 @@
 //! which would cancel, so this is the worst case. The reported range, the thesis's figure (6-9), then hides the GNSS error, which
 //! the true slot vector shows.
 
+mod chance;
 mod flyer;
 mod pilot;
 mod scene;
 mod score;
+pub mod swarm;
 
 pub use scene::{Flight, Gnss, Radio, Scenario, WIND_MPS};
 pub use score::{Errors, Report};
@@ -61,10 +63,10 @@ pub fn fly(scenario: &Scenario) -> Result<Report, FlightError> {
         let since_begin_ns = now.as_nanos() - begin.as_nanos();
         // The two computers' periods aren't in step.
         if since_begin_ns % PERIOD_NS == 35_000_000 {
+            leader.pilot(now, settled_at.map(|at| now.seconds_since(at) - SETTLE_S));
             if let Some(state) = leader.state(now) {
                 radio.send(state, now);
             }
-            leader.pilot(now, settled_at.map(|at| now.seconds_since(at) - SETTLE_S));
         }
         let mut heard = false;
         for state in radio.receive(now) {

@@ -1,8 +1,9 @@
 //! The leader's pilot: takes off, then flies by velocity and yaw rate, as sticks do.
 
-use halcyon_model::{FlightMode, LandedState, Stamp};
+use halcyon_model::{FlightMode, Intent, LandedState, Stamp};
 use mavlink::dialects::ardupilotmega as ardu;
 use mavlink::dialects::ardupilotmega::MavMessage;
+use nalgebra::Vector3;
 
 use super::flyer::Craft;
 use super::scene::Flight;
@@ -19,11 +20,12 @@ pub(super) struct Pilot {
     flight: Flight,
     asked: Option<Stamp>,
     up: bool,
+    intent: Option<Intent>,
 }
 
 impl Pilot {
     pub(super) fn new(flight: Flight) -> Self {
-        Self { flight, asked: None, up: false }
+        Self { flight, asked: None, up: false, intent: None }
     }
 
     /// Whether the leader has taken off.
@@ -31,10 +33,21 @@ impl Pilot {
         self.up
     }
 
+    /// What was last asked for, as the leader's own vehicle-link would tell it: a velocity, from where the vehicle was.
+    pub(super) fn intent(&self) -> Option<Intent> {
+        self.intent
+    }
+
     pub(super) fn step(&mut self, craft: &mut Craft, flown_s: f64, now: Stamp) {
         let Some((state, _)) = craft.link.state(now) else { return };
         if self.up {
             let (velocity_mps, yaw_rate_radps) = self.flight.wish(flown_s);
+            self.intent = Some(Intent {
+                stamp: now,
+                position_ned_m: state.position_ned_m + state.velocity_ned_mps * now.seconds_since(state.stamp),
+                velocity_ned_mps: velocity_mps,
+                acceleration_ned_mps2: Vector3::zeros(),
+            });
             craft.say(MavMessage::SET_POSITION_TARGET_LOCAL_NED(ardu::SET_POSITION_TARGET_LOCAL_NED_DATA {
                 vx: velocity_mps.x as f32,
                 vy: velocity_mps.y as f32,

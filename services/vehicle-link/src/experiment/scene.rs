@@ -9,6 +9,7 @@ use halcyon_sim::wind::WindConfig;
 use halcyon_sim::{SimConfig, SimVehicle};
 use nalgebra::Vector3;
 
+use super::chance::Chance;
 use crate::core::law::{Law, SlotLock};
 
 /// The thesis's wind: 8 mph, metres per second.
@@ -132,6 +133,8 @@ pub struct Scenario {
     pub separation: bool,
     /// Whether a setpoint follows each state heard at once, or only the next tick.
     pub on_arrival: bool,
+    /// Whether the leader says what it asks of its own autopilot, as one that its vehicle-link flies does; a pilot's doesn't.
+    pub shares_intent: bool,
     /// Seed of wind, sensors and losses.
     pub seed: u64,
 }
@@ -151,6 +154,7 @@ impl Scenario {
             gain_scale: 1.0,
             separation: true,
             on_arrival: true,
+            shares_intent: false,
             seed: 1,
         }
     }
@@ -171,13 +175,13 @@ impl Scenario {
 /// States under way.
 pub(super) struct Channel {
     radio: Radio,
-    random: SplitMix,
+    random: Chance,
     under_way: VecDeque<(Stamp, VehicleState)>,
 }
 
 impl Channel {
     pub(super) fn new(scenario: &Scenario) -> Self {
-        Self { radio: scenario.radio, random: SplitMix(scenario.seed), under_way: VecDeque::new() }
+        Self { radio: scenario.radio, random: Chance::new(scenario.seed), under_way: VecDeque::new() }
     }
 
     pub(super) fn send(&mut self, state: VehicleState, now: Stamp) {
@@ -192,19 +196,5 @@ impl Channel {
             arrived.extend(self.under_way.pop_front().map(|(_, state)| state));
         }
         arrived
-    }
-}
-
-/// Steele, Lea and Flood's SplitMix64: all the chance that a lost message needs.
-struct SplitMix(u64);
-
-impl SplitMix {
-    /// Uniform in [0, 1).
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut mixed = self.0;
-        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((mixed ^ (mixed >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
     }
 }

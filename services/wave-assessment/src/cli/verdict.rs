@@ -50,6 +50,7 @@ pub fn verdict(burst: &Burst, config: &Config) -> VerdictReport {
         // They come with the burst, and their words go first below.
         quality: Vec::new(),
         statistics: statistics(burst),
+        witness: None,
     };
     let Judgement { mut state, reasons, mut probability } = judge(&evidence, config, VerdictState::Inconclusive);
     let checks = reasons.into_iter().filter(|reason| !OF_PATCHES.contains(&reason.check.as_str()));

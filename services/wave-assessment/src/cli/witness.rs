@@ -91,7 +91,7 @@ impl WitnessReport {
         };
         let (verdict, why) = match agreement(&compared) {
             Verdict::Agree => ("agree", Vec::new()),
-            Verdict::Disagree { why } => ("disagree", why.iter().map(difference).collect()),
+            Verdict::Disagree { why } => ("disagree", why.iter().map(Difference::to_string).collect()),
             Verdict::Unknown { why } => ("unknown", why.iter().map(ignorance).collect()),
         };
         let ratio = compared.height_ratio.map(|ratio| (ratio.value, ratio.interval_95()));
@@ -134,24 +134,6 @@ impl WitnessReport {
         verdict.reasons.insert(0, reason);
         verdict.probability = None;
         verdict.state = "inconclusive";
-    }
-}
-
-fn difference(difference: &Difference) -> String {
-    let ratio = |what: &str, ratio: &halcyon_ocean::witness::Ratio| {
-        let (low, high) = ratio.interval_both_95();
-        format!("{what} is {:.3} times the witness's ({low:.3} to {high:.3})", ratio.value)
-    };
-    match difference {
-        Difference::UpsideDown { .. } => "it moves the other way, as if one of the two were positive down".into(),
-        Difference::Height(of) => ratio("H_m0", of),
-        Difference::Period(of) => ratio("the mean period", of),
-        Difference::Peak { a_s, b_s } => {
-            format!("peak period of {:.2} to {:.2} s against the witness's {:.2} to {:.2} s", a_s.0, a_s.1, b_s.0, b_s.1)
-        }
-        Difference::WavesInOne { which, h_m0_m, other_h_m0_m } => {
-            format!("{which} has waves of {h_m0_m:.3} m at least, the other at most {other_h_m0_m:.3} m")
-        }
     }
 }
 

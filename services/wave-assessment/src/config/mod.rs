@@ -43,6 +43,8 @@ pub struct Config {
     pub spot_radius_m: f64,
     /// Waves slower than this are neither claimed nor bounded: the autopilot's height wanders there, hertz.
     pub wave_hz_min: f64,
+    /// One standard deviation of a reading of the rig's downward rangefinder, metres: where there is one, it has to see the same waves.
+    pub range_sigma_m: f64,
     /// Slope is taken between points this far apart, metres: about the airframe's size, for shorter ripples do not tilt it.
     pub slope_baseline_m: f64,
     /// Largest significant wave height to land on, metres.
@@ -79,6 +81,7 @@ impl Default for Config {
             gap_s_max: 0.7,
             spot_radius_m: 3.0,
             wave_hz_min: 0.08,
+            range_sigma_m: 0.02,
             slope_baseline_m: 0.4,
             h_s_m_max: 0.15,
             h_tenth_m_max: 0.22,
@@ -112,6 +115,7 @@ impl Section for Config {
         within("gap_s_max", self.gap_s_max, 0.01, 60.0)?;
         within("spot_radius_m", self.spot_radius_m, 0.1, 1000.0)?;
         within("wave_hz_min", self.wave_hz_min, 0.0, 10.0)?;
+        within("range_sigma_m", self.range_sigma_m, 0.0, 10.0)?;
         within("slope_baseline_m", self.slope_baseline_m, 0.01, 10.0)?;
         within("h_s_m_max", self.h_s_m_max, 0.001, 20.0)?;
         within("h_tenth_m_max", self.h_tenth_m_max, 0.001, 40.0)?;

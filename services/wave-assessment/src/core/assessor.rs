@@ -1,12 +1,10 @@
 //! From patch to sea state.
 
 use halcyon_model::{
-    Directional, IdError, LocalPoint, QualityFlag, RigId, SeaState, Stamp, SurfacePatch, Verdict, VerdictReason, VerdictState,
+    IdError, LocalPoint, QualityFlag, RigId, SeaState, Stamp, SurfacePatch, VehicleState, Verdict, VerdictReason, VerdictState,
 };
 
-use super::ahead::calm;
-use super::direction::directional;
-use super::film::film;
+use super::around::{Around, Glance};
 use super::hidden::{Hidden, hidden};
 use super::patch::{self, PatchError};
 use super::quality;
@@ -14,6 +12,7 @@ use super::series::Series;
 use super::statistics::Statistics;
 use super::verdict::{Evidence, Judgement, judge};
 use super::window::Window;
+use super::witness::Witness;
 use crate::config::Config;
 
 /// Watches one rig's patches and says what the water is like. Keeps at most `window_s` of them, and never the pictures.
@@ -22,25 +21,24 @@ pub struct Assessor {
     config: Config,
     rig: RigId,
     window: Window,
+    witness: Witness,
     /// Patch time of the last sea state.
     assessed: Option<Stamp>,
     /// When the last sea state was issued, whatever it rested on.
     issued: Option<Stamp>,
     verdict: VerdictState,
+    /// What the last sea state rests on, and whether it could be trusted.
+    statistics: Option<Statistics>,
+    is_trusted: bool,
+    /// Rotor ripples, and patch time of when they were looked for.
+    ripples: Option<(Stamp, Option<QualityFlag>)>,
     around: Option<Around>,
+    /// Counts how often the window was filled anew.
+    filling: u64,
 }
 
-/// What changes slowly and takes whole grids to find.
-#[derive(Debug, Clone)]
-struct Around {
-    /// Patch time of it.
-    at: Stamp,
-    directional: Option<Directional>,
-    downwash: Option<QualityFlag>,
-}
-
-/// It is looked for once in so many seconds of patch time.
-const AROUND_PERIOD_S: f64 = 5.0;
+/// Rotor ripples are looked for once in so many seconds of patch time.
+const RIPPLES_PERIOD_S: f64 = 5.0;
 
 impl Assessor {
     /// An assessor that has seen nothing.
@@ -50,7 +48,20 @@ impl Assessor {
     pub fn new(config: Config) -> Result<Self, IdError> {
         let rig = RigId::new(&config.rig)?;
         let verdict = VerdictState::Inconclusive;
-        Ok(Self { config, rig, window: Window::default(), assessed: None, issued: None, verdict, around: None })
+        Ok(Self {
+            config,
+            rig,
+            window: Window::default(),
+            witness: Witness::default(),
+            assessed: None,
+            issued: None,
+            verdict,
+            statistics: None,
+            is_trusted: false,
+            ripples: None,
+            around: None,
+            filling: 0,
+        })
     }
 
     /// Takes in one patch, at its place in time if it comes late or out of order. A sea state comes out once in `period_s` of patch time.
@@ -89,11 +100,44 @@ impl Assessor {
         Ok(self.assess(now))
     }
 
-    /// The sea state of the window as it stands, whenever the last one was; `None` before the first patch.
+    /// Takes in what the rig's own vehicle says of itself: its rangefinder, where it has one, is a second witness of the waves.
+    pub fn hear(&mut self, state: &VehicleState, now: Stamp) {
+        if state.vehicle.as_str() == self.rig.as_str() {
+            self.witness.add(state, now, self.config.window_s, self.config.clock_skew_s_max);
+        }
+    }
+
+    /// The sea state of the window as it stands, with a look around, whenever the last ones were; `None` before the first patch.
     pub fn conclude(&mut self, now: Stamp) -> Option<SeaState> {
         self.assessed = self.window.newest().map(|frame| frame.stamp);
         self.issued = Some(now);
+        // What is looked for rests on the statistics, and the verdict on what is found.
+        let previous = self.verdict;
+        self.assess(now)?;
+        self.around = None;
+        self.look_around();
+        self.verdict = previous;
         self.assess(now)
+    }
+
+    /// The look around that it is time for, if it is; to be taken anywhere, and what it finds to be [noticed](Self::notice).
+    #[must_use]
+    pub fn glance(&self) -> Option<Glance> {
+        Glance::due(&self.window, &self.config, self.statistics.as_ref(), &self.witness, self.is_trusted, self.around.as_ref(), self.filling)
+    }
+
+    /// Takes in what a glance found. One from before the window was filled anew is of no use.
+    pub fn notice(&mut self, around: Around) {
+        if around.is_of(self.filling) {
+            self.around = Some(around);
+        }
+    }
+
+    /// A glance taken at once, if it is time for one: for those who have the time.
+    pub fn look_around(&mut self) {
+        if let Some(around) = self.glance().map(Glance::look) {
+            self.notice(around);
+        }
     }
 
     /// To be called now and then: an inconclusive sea state, once in `period_s`, while patches have stopped coming; `None` while they
@@ -129,19 +173,19 @@ impl Assessor {
         self.assessed = None;
         self.issued = None;
         self.verdict = VerdictState::Inconclusive;
+        self.statistics = None;
+        self.ripples = None;
         self.around = None;
+        self.filling += 1;
     }
 
-    /// Looks for directions and rotor ripples if it is time. Without waves above the noise there are no directions.
-    fn look_around(&mut self, newest: Stamp, interval_s: Option<f64>, statistics: Option<&Statistics>) {
-        if self.around.as_ref().is_some_and(|around| (0.0..AROUND_PERIOD_S).contains(&newest.seconds_since(around.at))) {
-            return;
+    /// Rotor ripples, looked for anew if it is time.
+    fn ripples(&mut self, newest: Stamp) -> Option<QualityFlag> {
+        let is_fresh = |at: &Stamp| (0.0..RIPPLES_PERIOD_S).contains(&newest.seconds_since(*at));
+        if !self.ripples.as_ref().is_some_and(|(at, _)| is_fresh(at)) {
+            self.ripples = Some((newest, quality::downwash(&self.window)));
         }
-        let direction = || {
-            let (statistics, interval_s) = (statistics?, interval_s?);
-            directional(&film(&self.window, interval_s)?, statistics.t_z_s?.value, statistics.freedom)
-        };
-        self.around = Some(Around { at: newest, directional: direction(), downwash: quality::downwash(&self.window) });
+        self.ripples.as_ref().and_then(|(_, found)| found.clone())
     }
 
     fn assess(&mut self, now: Stamp) -> Option<SeaState> {
@@ -157,10 +201,9 @@ impl Assessor {
             (hidden, series, statistics)
         });
         let (hidden, series, statistics) = measured.map_or((None, None, None), |(h, s, t)| (Some(h), Some(s), t));
-        self.look_around(newest, interval_s, statistics.as_ref());
+        let rings = self.ripples(newest);
         let frames = self.window.frames();
         let mean = |f: &dyn Fn(&super::window::Frame) -> f64| frames.iter().map(f).sum::<f64>() / frames.len() as f64;
-        let rings = self.around.as_ref().and_then(|around| around.downwash.clone());
         let evidence = Evidence {
             observed_s: series.as_ref().map_or(0.0, |s| s.observed_s),
             coverage: mean(&|f| f.coverage),
@@ -179,9 +222,12 @@ impl Assessor {
                 _ => rings.into_iter().collect(),
             },
             statistics,
+            witness: self.around.as_ref().and_then(|around| around.testimony(newest)).map(|said| (said.agrees, said.text.clone())),
         };
         let judgement = judge(&evidence, &self.config, self.verdict);
         self.verdict = judgement.state;
+        self.statistics.clone_from(&evidence.statistics);
+        self.is_trusted = judgement.probability.is_some();
         Some(self.report(now, newest, position, series.as_ref(), Some(&evidence), judgement))
     }
 
@@ -197,16 +243,10 @@ impl Assessor {
     ) -> SeaState {
         let statistics = evidence.and_then(|evidence| evidence.statistics.as_ref());
         let spectral = statistics.and_then(|s| s.spectral.as_ref());
-        let direction = self.around.as_ref().and_then(|around| around.directional.as_ref()).filter(|_| statistics.is_some());
-        let calm = spectral
-            .zip(direction)
-            // What cannot be trusted is not forecast.
-            .filter(|_| judgement.probability.is_some())
-            .and_then(|(spectral, direction)| calm(&self.window, spectral, direction, position, &self.config));
         let Judgement { state, reasons, probability } = judgement;
         let frames = self.window.frames();
         let (start, end) = (frames.front().map_or(measured, |f| f.stamp), frames.back().map_or(measured, |f| f.stamp));
-        SeaState {
+        let mut report = SeaState {
             stamp: now,
             rig: self.rig.clone(),
             window_start: start,
@@ -228,12 +268,24 @@ impl Assessor {
             t_m02_s: spectral.map(|s| s.t_m02_s),
             t_e_s: spectral.map(|s| s.t_e_s),
             vertical_speed_rms_mps: statistics.map(Statistics::vertical_speed_rms_mps),
-            directional: direction.copied(),
+            directional: None,
             spectrum: spectral.map(|s| s.spectrum.clone()),
             quality: evidence.map_or_else(Vec::new, |e| e.quality.clone()),
-            calm,
+            calm: None,
             trace: series.map_or_else(Vec::new, Series::trace),
             verdict: Verdict { state, probability, reasons, valid_until: measured.plus_secs_f64(self.config.validity_s) },
+        };
+        self.show_around(&mut report);
+        report
+    }
+
+    /// Puts what was found around into a sea state that rests on a measurement.
+    fn show_around(&self, state: &mut SeaState) {
+        let (Some(around), Some(newest)) = (&self.around, self.window.newest()) else { return };
+        if state.h_m0_m.is_some() {
+            state.directional = around.directional(newest.stamp);
+            // What cannot be trusted is not forecast.
+            state.calm = around.calm(newest.stamp).filter(|_| state.verdict.probability.is_some());
         }
     }
 }

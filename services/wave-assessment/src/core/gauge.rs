@@ -48,7 +48,7 @@ struct Gauge {
 
 /// Nine gauges in a square over the patch. Each stays over its water while the vehicle moves a little, and
 /// is placed anew when it leaves the patch or sees nothing.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Gauges {
     placed: [Option<Gauge>; GAUGES],
     next: u64,

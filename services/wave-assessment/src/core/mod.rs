@@ -7,11 +7,14 @@
 //! | window | the frames of the last while over the same spot |
 //! | series | one gauge's elevation over the window, broken where patches are missing |
 //! | film | the window's grids over one piece of water, for directions |
+//! | glance | a look around, apart from the patches: directions, quiet moments, the witness |
+//! | witness | the rig's rangefinder, which has to see the same waves |
 //! | hidden part | waves longer than the footprint: a patch's own mean level takes them out of its grid |
 //!
 //! Nothing here knows the bus, the disk or a clock: `now` is an argument.
 
 mod ahead;
+mod around;
 mod assessor;
 mod direction;
 mod film;
@@ -26,7 +29,9 @@ mod spectrum;
 mod statistics;
 mod verdict;
 mod window;
+mod witness;
 
+pub use around::{Around, Glance};
 pub use assessor::Assessor;
 pub use patch::PatchError;
 pub(crate) use quality::limits as quality_limits;

@@ -51,7 +51,7 @@ pub(crate) struct Frame {
 const GRIDS: usize = 4;
 
 /// Frames, oldest first.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Window {
     frames: VecDeque<Frame>,
     grids: VecDeque<ElevationGrid>,

@@ -1,8 +1,6 @@
 //! Seas and patches for tests: random sums of linear waves, written without anything of the estimator.
 #![allow(dead_code, unreachable_pub, clippy::unwrap_used, reason = "each test takes what it needs, and may fail")]
 
-pub mod truth;
-
 use halcyon_model::{ElevationGrid, Plane, RigId, Stamp, SurfacePatch};
 use halcyon_ocean::{Jonswap, Spectrum};
 use nalgebra::Vector3;

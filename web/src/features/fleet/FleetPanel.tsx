@@ -6,7 +6,7 @@ import type { Heard } from '../../state/reduce';
 import { fleetNow_ms, live, now_ms, vehicles } from '../../state/store';
 import { Icon, type IconName } from '../../ui/Icon';
 import { Panel } from '../../ui/Panel';
-import { activityText, activityTone, age_s, batteryTone, fixTone, inOrder, presence, type Tone } from './describe';
+import { activityText, activityTone, age_s, batteryTone, firmwareText, fixTone, inOrder, linkText, presence, type Tone } from './describe';
 
 export function FleetPanel() {
   const all = inOrder(Object.values(vehicles.value));
@@ -58,6 +58,9 @@ function VehicleRow({ heard }: { heard: Heard<Vehicle> }) {
           <Detail name="Slot error" value={length(vehicle.activity.slot_error_m)} />
           <Detail name="GNSS accuracy" value={quantity(vehicle.fix?.horizontal_sigma_m, 1, 'm')} />
           <Detail name="Voltage" value={quantity(vehicle.battery_v, 1, 'V')} />
+          <Detail name="Rangefinder" value={quantity(vehicle.range_m, 2, 'm')} />
+          <Detail name="Autopilot link" value={linkText(vehicle)} />
+          <Detail name="Firmware" value={firmwareText(vehicle)} />
           <Detail name="Estimator" value={vehicle.estimator_ok ? 'good' : 'not good'} />
           <Detail name="Ready to arm" value={vehicle.ready_to_arm ? 'yes' : 'no'} />
           <Detail name="Plan" value={vehicle.plan_generation === 0 ? 'none' : `no. ${fixed(vehicle.plan_generation, 0)}`} />

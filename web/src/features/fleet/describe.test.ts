@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import { T0, vehicle } from '../../state/fixtures';
-import { activityText, activityTone, batteryTone, fixTone, inOrder, presence } from './describe';
+import { activityText, activityTone, batteryTone, firmwareText, fixTone, inOrder, linkText, presence } from './describe';
 
 const heard = (over = {}, heard_ms = 0) => ({ value: vehicle(over), heard_ms });
 
@@ -39,6 +39,19 @@ describe('words', () => {
     expect(fixTone(vehicle({ fix: null }))).toBe('idle');
     expect(fixTone(vehicle({ fix: { kind: '3d', satellites: 5, horizontal_sigma_m: 1 } }))).toBe('warn');
   });
+});
+
+describe('link and firmware', () => {
+  const link = { loss_percent: 0.44, round_trip_ms: 12.3, received: 100, signed: false };
+  const plain = (text: string) => text.replaceAll('\u00a0', ' ').replaceAll('\u202f', ' ');
+  it('says what is known', () => {
+    expect(plain(linkText(vehicle({ link })))).toBe('0.4 % lost, 12 ms');
+    expect(plain(linkText(vehicle({ link: { ...link, loss_percent: 23.4, round_trip_ms: null, signed: true } })))).toBe('23 % lost, signed');
+    const firmware = { autopilot: 'ArduPilot', vehicle: 'quadrotor', version: '4.6.0' };
+    expect(firmwareText(vehicle({ firmware }))).toBe('ArduPilot 4.6.0 (quadrotor)');
+    expect(firmwareText(vehicle({ firmware: { ...firmware, version: '' } }))).toBe('ArduPilot (quadrotor)');
+  });
+  it('is unknown until something was heard', () => expect([linkText(vehicle()), firmwareText(vehicle())]).toEqual(['–', '–']));
 });
 
 it('leaders come first, numbers in order', () => {

@@ -1,6 +1,6 @@
 /** A vehicle in words and tones. Pure. */
 import type { Vehicle } from '../../api/types';
-import { length, words } from '../../lib/format';
+import { length, percent, quantity, UNKNOWN, words } from '../../lib/format';
 import type { Heard } from '../../state/reduce';
 
 export type Tone = 'ok' | 'warn' | 'bad' | 'idle';
@@ -65,6 +65,20 @@ export function fixTone(vehicle: Vehicle): Tone {
   if (vehicle.fix === null) return 'idle';
   if (!vehicle.estimator_ok || ['no_gps', 'no_fix', '2d'].includes(vehicle.fix.kind)) return 'bad';
   return vehicle.fix.satellites < 8 || (vehicle.fix.horizontal_sigma_m ?? 0) > 3 ? 'warn' : 'ok';
+}
+
+/** `0.4 % lost, 12 ms`; a number that is not known is left out. */
+export function linkText({ link }: Vehicle): string {
+  if (link === null) return UNKNOWN;
+  const lost = link.loss_percent < 10 ? quantity(link.loss_percent, 1, '%') : percent(link.loss_percent);
+  const trip = link.round_trip_ms === null ? '' : `, ${quantity(link.round_trip_ms, 0, 'ms')}`;
+  return `${lost} lost${trip}${link.signed ? ', signed' : ''}`;
+}
+
+/** `ArduPilot 4.6.0 (quadrotor)`. */
+export function firmwareText({ firmware }: Vehicle): string {
+  if (firmware === null) return UNKNOWN;
+  return `${[firmware.autopilot, firmware.version].filter((part) => part !== '').join(' ')} (${firmware.vehicle})`;
 }
 
 /** Leaders first, then by name, with numbers in order: `follower-2` before `follower-10`. */

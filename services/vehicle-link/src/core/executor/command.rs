@@ -1,10 +1,11 @@
 //! Direct commands from people and from the planner. They work with the planner down.
 
-use halcyon_model::{FlightMode, LandedState, LocalPoint, Severity, Stamp, VehicleAction, VehicleCommand, VehicleState};
+use halcyon_model::{FlightMode, ItemKind, LandedState, LocalPoint, Severity, Stamp, VehicleAction, VehicleCommand, VehicleState};
 
 use super::{Direct, Executor, Goal};
 use crate::core::commands::Command;
 use crate::core::interlock::{self, mode_name};
+use crate::core::transfers::Request;
 
 /// What becomes of a direct command.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,6 +16,10 @@ pub enum Decision {
     Refused(String),
     /// The autopilot decides: ask it, and answer with the outcome.
     Ask(Command),
+    /// It is a transfer with the autopilot: begin it, and answer with its end.
+    Transfer(Request),
+    /// End the transfers under way.
+    CancelTransfers,
 }
 
 impl Executor {
@@ -51,6 +56,15 @@ impl Executor {
         }
         if let VehicleAction::SetMode(mode) = *action {
             return Ok(self.set_mode(mode, now));
+        }
+        // Reading harms nobody, and what is written has its own conditions, whoever flies.
+        if let Some(decision) = transfer(action, &own.state)? {
+            return Ok(decision);
+        }
+        match action {
+            VehicleAction::ReleasePayload => return self.payload(&own.state, true),
+            VehicleAction::SecurePayload => return self.payload(&own.state, false),
+            _ => {}
         }
         if self.control.hands_off() {
             return Err(format!("the pilot has the vehicle ({}); set GUIDED to take it back", mode_name(own.state.mode)));
@@ -122,8 +136,18 @@ impl Executor {
                 self.take_over(goal, command);
                 Ok(Decision::Accepted("turning".into()))
             }
-            // Both were dealt with above.
-            VehicleAction::Terminate | VehicleAction::SetMode(_) => Err("not here".into()),
+            // All were dealt with above.
+            VehicleAction::Terminate
+            | VehicleAction::SetMode(_)
+            | VehicleAction::ReadParameter { .. }
+            | VehicleAction::ReadParameters
+            | VehicleAction::SetParameter { .. }
+            | VehicleAction::DownloadItems { .. }
+            | VehicleAction::UploadItems { .. }
+            | VehicleAction::ClearItems { .. }
+            | VehicleAction::CancelTransfer
+            | VehicleAction::ReleasePayload
+            | VehicleAction::SecurePayload => Err("not here".into()),
         }
     }
 
@@ -190,6 +214,45 @@ impl Executor {
     }
 }
 
+/// What is to be transferred, if that is what is asked for.
+///
+/// A parameter is written while the motors are off, unless who asks says that it is meant in flight, too. A new fence in flight
+/// may be one that is broken already, and the autopilot would act on it, so a fence changes with the motors off only; a mission
+/// and rally points are looked at when the pilot flies by them.
+fn transfer(action: &VehicleAction, own: &VehicleState) -> Result<Option<Decision>, String> {
+    let fence = |kind: ItemKind| {
+        if kind == ItemKind::Fence && own.armed {
+            return Err("armed: a fence is changed with the motors off".to_owned());
+        }
+        Ok(())
+    };
+    let request = match action {
+        VehicleAction::ReadParameter { name } => Request::Read(name.clone()),
+        VehicleAction::ReadParameters => Request::ReadAll,
+        VehicleAction::SetParameter { name, value, even_in_flight } => {
+            if own.armed && !even_in_flight {
+                return Err(format!("armed: {name} is set with the motors off, or with even_in_flight"));
+            }
+            Request::Set(name.clone(), *value)
+        }
+        VehicleAction::DownloadItems { kind } => Request::Download(*kind),
+        VehicleAction::UploadItems { kind, items } => {
+            fence(*kind)?;
+            if let Some((at, problem)) = items.iter().enumerate().find_map(|(at, item)| Some((at, item.problem(*kind)?))) {
+                return Err(format!("item {}: {problem}", at + 1));
+            }
+            Request::Upload(*kind, items.clone())
+        }
+        VehicleAction::ClearItems { kind } => {
+            fence(*kind)?;
+            Request::Clear(*kind)
+        }
+        VehicleAction::CancelTransfer => return Ok(Some(Decision::CancelTransfers)),
+        _ => return Ok(None),
+    };
+    Ok(Some(Decision::Transfer(request)))
+}
+
 fn name(action: &VehicleAction) -> &'static str {
     match action {
         VehicleAction::Arm => "arm",
@@ -203,5 +266,13 @@ fn name(action: &VehicleAction) -> &'static str {
         VehicleAction::SetMode(_) => "set mode",
         VehicleAction::SetHeading { .. } => "set heading",
         VehicleAction::Terminate => "terminate",
+        VehicleAction::ReadParameter { .. } | VehicleAction::ReadParameters => "read parameters",
+        VehicleAction::SetParameter { .. } => "set parameter",
+        VehicleAction::DownloadItems { .. } => "download items",
+        VehicleAction::UploadItems { .. } => "upload items",
+        VehicleAction::ClearItems { .. } => "clear items",
+        VehicleAction::CancelTransfer => "cancel transfer",
+        VehicleAction::ReleasePayload => "release payload",
+        VehicleAction::SecurePayload => "secure payload",
     }
 }

@@ -19,6 +19,10 @@ const CLIMBED_MPS: f64 = 0.5;
 const NEAR_M: f64 = 3.0;
 /// Lower than the floor by more than this, a vehicle climbs before it goes anywhere, metres.
 pub(super) const LOW_M: f64 = 0.7;
+/// A velocity that the separation filter has changed by more than this is braked with an acceleration on top, up to so much: metres
+/// per second, metres per second squared.
+const REFUSED_MPS: f64 = 0.3;
+const BRAKING_MPS2_MAX: f64 = 2.5;
 /// Setpoints end this far inside the fence, metres.
 const FENCE_INSIDE_M: f64 = 2.0;
 
@@ -84,6 +88,10 @@ impl Executor {
             self.held = None;
             self.left_slot();
             self.inverse = Inverse::default();
+            if self.continuity.shift_ned_m().norm() > 0.0 {
+                // Formation is flown by another place than all else.
+                self.reference = None;
+            }
         }
         self.flying = Some(effective.clone());
         let mut step = Step { own, here_ned_m, dt_s, now, outputs };
@@ -228,7 +236,12 @@ impl Executor {
         limit_velocity(&mut velocity, limits, limits.descent_mps);
         reference.advance(velocity, step.here_ned_m, step.dt_s);
         let Reference { position_ned_m, velocity_ned_mps } = self.bounded(reference, floor_m, step);
-        let setpoint = Setpoint { position_ned_m, velocity_ned_mps, acceleration_ned_mps2: None, heading_rad };
+        // Somebody is in the way: what the velocity loop would do in half a second is asked for at once.
+        let refused_mps = (velocity - wanted).norm();
+        let braking_mps2 = (velocity_ned_mps - step.own.velocity_ned_mps).cap_magnitude(BRAKING_MPS2_MAX);
+        let level_mps2 = Vector3::new(braking_mps2.x, braking_mps2.y, 0.0);
+        let acceleration_ned_mps2 = (refused_mps > REFUSED_MPS).then_some(level_mps2);
+        let setpoint = Setpoint { position_ned_m, velocity_ned_mps, acceleration_ned_mps2, heading_rad };
         step.outputs.push(Output::Setpoint(setpoint));
     }
 

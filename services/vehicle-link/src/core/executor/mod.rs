@@ -25,6 +25,7 @@ mod flight;
 mod goal;
 mod ground;
 mod intake;
+mod payload;
 mod settle;
 mod slot;
 mod watch;
@@ -32,7 +33,7 @@ mod watch;
 use std::collections::BTreeMap;
 
 use halcyon_model::{
-    Activity, FlightMode, LandedState, LocalFrame, LocalPoint, Severity, Slot, Stamp, VehicleId, VehicleState,
+    Activity, FlightMode, Intent, LandedState, LocalFrame, LocalPoint, Severity, Slot, Stamp, VehicleId, VehicleState,
 };
 use nalgebra::Vector3;
 
@@ -41,14 +42,17 @@ pub use goal::Goal;
 pub use intake::PlanAnswer;
 
 use super::commands::{Command, CommandError};
+use super::continuity::Continuity;
 use super::control::{Change, Control};
 use super::failsafe::{FailSafes, PlanHealth};
 use super::guidance::{Guidance, Reference, Setpoint};
 use super::interlock::mode_name;
 use super::inverse::Inverse;
 use super::limits::{FailSafeLimits, Limits};
+use super::payload::Payload;
 use super::track::Track;
 use descent::Landing;
+use payload::Release;
 use settle::Settle;
 use watch::Watch;
 
@@ -56,6 +60,8 @@ use watch::Watch;
 pub const RESTART_GRACE_S: f64 = 10.0;
 /// A request that was refused or unanswered is made again after this time, seconds.
 const AGAIN_S: f64 = 5.0;
+/// What was asked of the autopilot is what the vehicle means to do for so long, seconds.
+const INTENT_S_MAX: f64 = 0.5;
 /// Neighbours remembered; the fleet is smaller.
 const NEIGHBOURS_MAX: usize = 64;
 
@@ -70,6 +76,8 @@ pub struct ExecutorConfig {
     pub fail_safe: FailSafeLimits,
     /// How slots are kept.
     pub guidance: Guidance,
+    /// What holds the payload.
+    pub payload: Payload,
     /// Height of home above mean water, metres.
     pub home_height_m: f64,
     /// The fleet's frame.
@@ -161,6 +169,10 @@ pub struct Executor {
     /// What is left between the reference and the slot that it has joined, metres.
     slot_left_m: Option<Vector3<f64>>,
     inverse: Inverse,
+    /// The vehicle's own place, short of its receiver's leaps: what formation is flown by.
+    continuity: Continuity,
+    /// What was last asked of the autopilot, for those who follow.
+    intent: Option<Intent>,
     /// Who follows whom where, by the newest plan.
     formation: BTreeMap<VehicleId, (VehicleId, Slot)>,
     held: Option<Vector3<f64>>,
@@ -170,6 +182,7 @@ pub struct Executor {
     uncleared: Option<Stamp>,
     landed_for_goal: bool,
     touchdown: Option<LocalPoint>,
+    release: Release,
     stepped: Option<Stamp>,
     active: Option<Goal>,
     /// The goal that the last step in the air flew: the active one, or a fail-safe's.
@@ -207,6 +220,8 @@ impl Executor {
             reference: None,
             slot_left_m: None,
             inverse: Inverse::default(),
+            continuity: Continuity::default(),
+            intent: None,
             formation: BTreeMap::new(),
             held: None,
             settle: Settle::default(),
@@ -214,6 +229,7 @@ impl Executor {
             uncleared: None,
             landed_for_goal: false,
             touchdown: None,
+            release: Release::default(),
             stepped: None,
             active: None,
             flying: None,
@@ -258,6 +274,8 @@ impl Executor {
         state.activity = self.activity.clone();
         state.plan_generation = self.plan_generation();
         state.touchdown = self.touchdown;
+        let in_force = |intent: &Intent| state.stamp.seconds_since(intent.stamp).abs() <= INTENT_S_MAX;
+        state.intent = self.intent.filter(|intent| state.mode == FlightMode::Guided && in_force(intent));
     }
 
     /// Whether this vehicle keeps a slot beside `other` now: news of it is worth a step at once.
@@ -314,6 +332,7 @@ impl Executor {
         if first && self.airborne {
             self.restarted_at = Some(now);
         }
+        self.continuity.observe(state.stamp, state.position_ned_m, state.velocity_ned_mps);
         self.own = Some(Own { state, mode_heard });
         if was_airborne && !self.airborne {
             self.touched_down();
@@ -329,6 +348,7 @@ impl Executor {
 
     /// How a request ended.
     pub fn observe_outcome(&mut self, command: &Command, outcome: &Result<(), CommandError>, now: Stamp) {
+        self.observe_payload(command, outcome);
         let ours = self.pending.as_ref().is_some_and(|pending| pending.command == *command);
         if let (true, Err(error)) = (ours, outcome) {
             self.pending = Some(Pending { command: *command, at: now, refused: true });
@@ -363,6 +383,10 @@ impl Executor {
             Some(own) => self.step_with(&own, dt_s, now, &mut outputs),
         }
         self.note_change(&before);
+        self.intent = outputs.iter().rev().find_map(|output| match output {
+            Output::Setpoint(setpoint) => Some(setpoint.intent(now)),
+            _ => None,
+        });
         outputs.extend(self.notes.drain(..).map(Output::Note));
         outputs
     }
@@ -397,6 +421,7 @@ impl Executor {
             self.fly(&own.state, goal, dt_s, now, outputs);
         } else {
             self.stand(&own.state, goal, now, outputs);
+            self.release_on_touchdown(&own.state, now, outputs);
         }
     }
 
@@ -569,5 +594,7 @@ fn describe(command: &Command) -> String {
         Command::SetMode(mode) => format!("mode {}", mode_name(*mode)),
         Command::TakeOff { height_above_home_m } => format!("take-off to {height_above_home_m:.1} m"),
         Command::SetInterval(stream) => format!("the stream of message {}", stream.message_id),
+        Command::Payload(payload) if payload.releases => "releasing the payload".into(),
+        Command::Payload(_) => "securing the payload".into(),
     }
 }

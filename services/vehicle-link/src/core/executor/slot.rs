@@ -26,7 +26,21 @@ const FEED_MPS2_MAX: f64 = 5.0;
 const CHANGED_MPS: f64 = 1e-6;
 
 impl Executor {
+    /// Keeps the slot. Flown by a place without leaps, which the autopilot's own place has: what is sent is put back into that.
     pub(super) fn follow(&mut self, leader: &VehicleId, slot: &Slot, step: &mut Step) {
+        let shift_m = self.continuity.shift_ned_m();
+        let before = step.outputs.len();
+        step.here_ned_m -= shift_m;
+        self.keep_formation(leader, slot, step);
+        step.here_ned_m += shift_m;
+        for output in step.outputs.iter_mut().skip(before) {
+            if let Output::Setpoint(setpoint) = output {
+                setpoint.position_ned_m += shift_m;
+            }
+        }
+    }
+
+    fn keep_formation(&mut self, leader: &VehicleId, slot: &Slot, step: &mut Step) {
         let Some(track) = self.neighbours.get(leader) else {
             // The interlock has refused this already; hold all the same.
             self.hold(None, step);

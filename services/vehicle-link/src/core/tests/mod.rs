@@ -6,4 +6,5 @@ mod flights;
 mod formation;
 mod mishaps;
 mod properties;
+mod payload;
 mod world;

@@ -10,6 +10,7 @@ use crate::core::commands::Command;
 use crate::core::executor::{Decision, Executor, ExecutorConfig, Note, Output, PlanAnswer};
 use crate::core::guidance::{Guidance, Setpoint};
 use crate::core::limits::{FailSafeLimits, Limits};
+use crate::core::payload::Payload;
 
 pub(super) const DT_S: f64 = 0.1;
 
@@ -38,6 +39,7 @@ pub(super) struct Copter {
     pub(super) ready: bool,
     /// Nothing is heard from it.
     pub(super) silent: bool,
+    pub(super) holds_payload: bool,
     /// What its estimator believes is where it is and this: jumps, a barometer's drift. It flies by what it believes.
     pub(super) off: Vector3<f64>,
     /// Seconds since it booted.
@@ -75,6 +77,7 @@ impl Copter {
                 self.climb_to = Some(height_above_home_m - self.home.z);
             }
             Command::SetInterval(_) => {}
+            Command::Payload(payload) => self.holds_payload = !payload.releases,
             Command::Arm | Command::Disarm { .. } | Command::TakeOff { .. } => return no("failed"),
         }
         Ok(())
@@ -187,6 +190,7 @@ pub(super) fn config(name: &str) -> ExecutorConfig {
         limits: Limits::default(),
         fail_safe: FailSafeLimits::default(),
         guidance: Guidance::default(),
+        payload: Payload::default(),
         home_height_m: 0.0,
         frame: origin().frame(),
     }
@@ -206,6 +210,7 @@ impl World {
             estimator_ok: true,
             ready: true,
             silent: false,
+            holds_payload: true,
             off: Vector3::zeros(),
             boot_s: 100.0,
             rangefinder: None,

@@ -31,6 +31,8 @@ pub(crate) struct Evidence {
     /// Quality tests that did not pass.
     pub quality: Vec<QualityFlag>,
     pub statistics: Option<Statistics>,
+    /// Whether a second witness agrees, and what it says; `None` where it says nothing.
+    pub witness: Option<(bool, String)>,
 }
 
 /// What [`judge`] says.
@@ -94,6 +96,9 @@ fn measurement(checks: &mut Checks, evidence: &Evidence, config: &Config) {
     );
     for flag in evidence.quality.iter().filter(|flag| flag.failed) {
         checks.add(&flag.test, Outcome::Untrusted, flag.text.clone());
+    }
+    if let Some((agrees, text)) = &evidence.witness {
+        checks.trusted("witness", *agrees, text.clone());
     }
     let footprint_m = evidence.footprint_m;
     match evidence.hidden_m {
