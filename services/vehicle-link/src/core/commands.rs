@@ -467,13 +467,13 @@ mod tests {
         let effects = commands.poll(to(), &Texts::default(), t(1.2));
         assert_eq!(stop(&effects), 1);
         // Not even the pilot's mode change withdraws it, if a person asked.
-        assert!(commands.withdraw(None).is_empty());
+        assert!(commands.withdraw(None, None).is_empty());
         commands.observe_ack(&accepted, OWN.0, OWN.1, t(1.3));
         let effects = commands.poll(to(), &Texts::default(), t(1.3));
         assert!(matches!(effects[..], [Effect::Done(99, Command::Disarm { force: true }, Ok(()))]), "{effects:?}");
         // Our own is.
         commands.submit(0, Command::Disarm { force: true }).unwrap();
-        assert_eq!(commands.withdraw(None).len(), 1);
+        assert_eq!(commands.withdraw(None, None).len(), 1);
     }
 
     #[test]
@@ -547,7 +547,8 @@ mod tests {
     fn what_is_in_progress_is_cancelled_when_it_is_withdrawn_and_tells_how_far_it_was() {
         let takeoff = Command::TakeOff { height_above_home_m: 5.0 };
         let id = MavCmd::MAV_CMD_NAV_TAKEOFF;
-        let progress = |percent| ardu::COMMAND_ACK_DATA { progress: percent, ..ack(id, MavResult::MAV_RESULT_IN_PROGRESS, OWN) };
+        let progress =
+            |percent| ardu::COMMAND_ACK_DATA { progress: percent, ..ack(id, MavResult::MAV_RESULT_IN_PROGRESS, OWN) };
         let begun = || {
             let mut commands = Commands::default();
             commands.submit(1, takeoff).unwrap();
