@@ -159,7 +159,7 @@ fn a_fence_is_not_broken_by_a_position_that_jumped_over_it() {
     assert!(matches!(world.activity(0), Activity::Holding { settled: true }), "{:?}", world.activity(0));
 }
 
-/// One holds and says that it is 30 m away; the other's way leads through where it really is.
+/// One is held by its pilot and says that it is 30 m away; the other's way leads through where it really is.
 #[test]
 fn a_neighbour_that_jumped_is_kept_clear_of_where_it_was() {
     let mut world = World::new(&[(0.0, 0.0), (0.0, -8.0)]);
@@ -167,6 +167,7 @@ fn a_neighbour_that_jumped_is_kept_clear_of_where_it_was() {
     world.airborne(1, Vector3::new(40.0, -30.0, -5.0));
     let plan = |world: &mut World| drop(world.plan(&[(0, survey(40.0, 0.0)), (1, survey(40.0, 30.0))], 5.0));
     world.until(30.0, plan, |world| (world.copters[0].position - world.copters[1].position).norm() < 12.0);
+    world.copters[0].mode = FlightMode::Loiter;
     world.copters[0].off = Vector3::new(30.0, 0.0, 0.0);
     world.run(4.9, plan);
     assert!(world.least_m >= 5.0, "{}", world.least_m);
