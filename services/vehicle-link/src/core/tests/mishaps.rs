@@ -1,8 +1,6 @@
 //! The rows of the fail-safe table that concern positions, clocks, energy and the surface; and the table itself.
 
-use halcyon_model::{
-    Activity, CalmWindow, DispatchPlan, FlightMode, LocalPoint, Range, Severity, Stamp, Task, VehicleAction, VehicleState,
-};
+use halcyon_model::{Activity, CalmWindow, FlightMode, LocalPoint, Severity, Task, VehicleAction, VehicleState};
 use nalgebra::Vector3;
 
 use super::world::{DT_S, World, follow, id, land, survey};
@@ -301,7 +299,9 @@ fn a_battery_that_just_suffices_for_the_way_home_sends_it_there() {
         world.airborne(0, Vector3::new(400.0, 0.0, -6.0));
         let mut left = 0.9;
         let far = |world: &mut World| {
-            drop(world.plan(&[(0, Task::Survey { point: LocalPoint::new(400.0, 0.0), height_m: 6.0, heading_rad: None })], 5.0))
+            drop(
+                world.plan(&[(0, Task::Survey { point: LocalPoint::new(400.0, 0.0), height_m: 6.0, heading_rad: None })], 5.0),
+            );
         };
         world.until(
             1000.0,
