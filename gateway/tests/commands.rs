@@ -9,8 +9,8 @@ use std::time::Duration;
 use halcyon_gateway::Config;
 use halcyon_gateway::port::CommandFailure;
 use halcyon_model::{
-    Approval, CommandReply, Content, FlightMode, FormationSpec, Item, ItemFrame, ItemKind, MissionAction, MissionPhase, Parameter,
-    ParameterKind, ParameterName, Shape, VehicleAction, VehicleId,
+    Approval, CommandReply, Content, FlightMode, FormationSpec, Item, ItemFrame, ItemKind, MissionAction, MissionPhase,
+    Parameter, ParameterKind, ParameterName, Shape, VehicleAction, VehicleId,
 };
 use serde_json::json;
 use support::*;

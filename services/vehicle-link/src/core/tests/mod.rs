@@ -5,6 +5,6 @@ mod failsafes;
 mod flights;
 mod formation;
 mod mishaps;
-mod properties;
 mod payload;
+mod properties;
 mod world;

@@ -17,6 +17,7 @@ use crate::core::executor::{Executor, ExecutorConfig, Output};
 use crate::core::guidance::Guidance;
 use crate::core::law::offset_ned_m;
 use crate::core::limits::{FailSafeLimits, Limits};
+use crate::core::payload::Payload;
 use air::{Air, Message};
 use craft::{Craft, frame};
 use scene::Pilot;
@@ -136,6 +137,7 @@ impl Swarm {
                 fail_safe: FailSafeLimits::default(),
                 guidance: Guidance::default(),
                 home_height_m: 0.0,
+                payload: Payload::default(),
                 frame: frame(),
             }));
         }

@@ -8,7 +8,9 @@ fn probe() {
     let count: u64 = std::env::var("FLIGHTS").ok().and_then(|count| count.parse().ok()).unwrap_or(20);
     use rayon::prelude::*;
     let show = |name: String, make: &(dyn Fn(u64) -> SwarmScenario + Sync)| {
-        if std::env::var("ONLY").is_ok_and(|only| !name.contains(&only)) { return; }
+        if std::env::var("ONLY").is_ok_and(|only| !name.contains(&only)) {
+            return;
+        }
         let begin = std::time::Instant::now();
         let mut all: Vec<(f64, u64, SwarmReport)> = (1..=count)
             .into_par_iter()
