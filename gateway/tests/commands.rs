@@ -9,8 +9,8 @@ use std::time::Duration;
 use halcyon_gateway::Config;
 use halcyon_gateway::port::CommandFailure;
 use halcyon_model::{
-    Approval, CommandReply, Content, FlightMode, Item, ItemFrame, ItemKind, MissionAction, MissionPhase, Parameter, ParameterKind,
-    ParameterName, VehicleAction,
+    Approval, CommandReply, Content, FlightMode, Item, ItemFrame, ItemKind, MissionAction, MissionPhase, Parameter,
+    ParameterKind, ParameterName, VehicleAction,
 };
 use serde_json::json;
 use support::*;

@@ -32,7 +32,10 @@ pub use surface::{Preview, Series, SeriesSample, Surface, WaveHeightSample};
 pub use transfer::{
     CommandId, Frame, Item, ItemList, ItemUpload, ListKind, Parameter, ParameterList, ParameterType, SetParameter,
 };
-pub use vehicle::{AccelerationNed, Activity, ActivityKind, Ages, Firmware, Fix, FixKind, LandedState, LinkQuality, LocalPosition, Position, Role, Vehicle, VelocityNed};
+pub use vehicle::{
+    AccelerationNed, Activity, ActivityKind, Ages, Firmware, Fix, FixKind, LandedState, LinkQuality, LocalPosition, Position,
+    Role, Vehicle, VelocityNed,
+};
 
 /// What conversion to JSON needs beside the noun itself: the fleet's local frame and the present.
 #[derive(Debug, Clone, Copy)]

@@ -128,9 +128,11 @@ pub async fn upload(
     if request.items.len() > ITEMS_MAX {
         return Err(ApiError::Invalid(format!("{} items; at most {ITEMS_MAX}", request.items.len())));
     }
-    let read = request.items.into_iter().enumerate().map(|(at, item)| {
-        item.read(kind).map_err(|error| ApiError::Invalid(format!("item {}: {error}", at + 1)))
-    });
+    let read = request
+        .items
+        .into_iter()
+        .enumerate()
+        .map(|(at, item)| item.read(kind).map_err(|error| ApiError::Invalid(format!("item {}: {error}", at + 1))));
     let items = read.collect::<Result<_, _>>()?;
     let watch = format!("/api/v1/vehicles/{vehicle}/{}", kind.name());
     let reply = ask(&app, &headers, vehicle, VehicleAction::UploadItems { kind, items }).await?;

@@ -99,11 +99,9 @@ fn action_to(action: &VehicleAction) -> v1::vehicle_command::Action {
         VehicleAction::Terminate => Action::Terminate(nothing),
         VehicleAction::ReadParameter { name } => Action::ReadParameter(name.to_string()),
         VehicleAction::ReadParameters => Action::ReadParameters(nothing),
-        VehicleAction::SetParameter { name, value, even_in_flight } => Action::SetParameter(v1::SetParameter {
-            name: name.to_string(),
-            value: *value,
-            even_in_flight: *even_in_flight,
-        }),
+        VehicleAction::SetParameter { name, value, even_in_flight } => {
+            Action::SetParameter(v1::SetParameter { name: name.to_string(), value: *value, even_in_flight: *even_in_flight })
+        }
         VehicleAction::DownloadItems { kind } => Action::DownloadItems(kind_to(*kind)),
         VehicleAction::UploadItems { kind, items } => {
             Action::UploadItems(v1::UploadItems { kind: kind_to(*kind), items: items_to(items) })

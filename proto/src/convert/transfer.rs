@@ -9,11 +9,7 @@ pub(super) fn name_from(path: &str, text: String) -> Result<ParameterName, Field
 }
 
 fn parameter_to(parameter: &Parameter) -> v1::Parameter {
-    v1::Parameter {
-        name: parameter.name.to_string(),
-        value: parameter.value,
-        kind: i32::from(parameter.kind.number()),
-    }
+    v1::Parameter { name: parameter.name.to_string(), value: parameter.value, kind: i32::from(parameter.kind.number()) }
 }
 
 fn parameter_from(parameter: v1::Parameter) -> Result<Parameter, FieldError> {

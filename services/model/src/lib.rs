@@ -50,9 +50,7 @@ pub use stereo::{
     CameraIntrinsics, ElevationGrid, Image, Plane, PoseAtExposure, Preview, RigCalibration, StereoPair, SurfacePatch,
 };
 pub use time::Stamp;
-pub use transfer::{
-    Content, Item, ItemFrame, ItemKind, Parameter, ParameterKind, ParameterName, ParameterNameError,
-};
+pub use transfer::{Content, Item, ItemFrame, ItemKind, Parameter, ParameterKind, ParameterName, ParameterNameError};
 pub use vehicle::{
     Activity, Ages, Firmware, Fix, FlightMode, Intent, LandedState, LinkQuality, Range, Role, SimTruth, VehicleState,
 };

@@ -69,8 +69,7 @@ pub enum ParameterKind {
 
 impl ParameterKind {
     /// Every kind, in the order of MAVLink's numbers.
-    pub const ALL: [Self; 7] =
-        [Self::Uint8, Self::Int8, Self::Uint16, Self::Int16, Self::Uint32, Self::Int32, Self::Real32];
+    pub const ALL: [Self; 7] = [Self::Uint8, Self::Int8, Self::Uint16, Self::Int16, Self::Uint32, Self::Int32, Self::Real32];
 
     /// In a word, such as `int16`.
     #[must_use]
@@ -254,11 +253,8 @@ impl Item {
             return Some(format!("command {} does not belong into a {}", self.command, kind.name()));
         }
         let (parameter_max, place_max) = (f64::from(f32::MAX), f64::from(i32::MAX - 1));
-        let bounds = if self.frame == ItemFrame::None {
-            [place_max, place_max, parameter_max]
-        } else {
-            [90.0, 180.0, 100_000.0]
-        };
+        let bounds =
+            if self.frame == ItemFrame::None { [place_max, place_max, parameter_max] } else { [90.0, 180.0, 100_000.0] };
         let place = [self.latitude_deg, self.longitude_deg, self.altitude_m];
         let names = ["latitude_deg", "longitude_deg", "altitude_m"];
         for ((name, value), bound) in names.into_iter().zip(place).zip(bounds) {
@@ -288,7 +284,8 @@ mod tests {
     /// Numbers by MAVLink's common.xml.
     #[test]
     fn numbers_are_mavlinks() {
-        for (number, name) in [(1, "uint8"), (2, "int8"), (3, "uint16"), (4, "int16"), (5, "uint32"), (6, "int32"), (9, "real32")]
+        for (number, name) in
+            [(1, "uint8"), (2, "int8"), (3, "uint16"), (4, "int16"), (5, "uint32"), (6, "int32"), (9, "real32")]
         {
             assert_eq!(ParameterKind::from_number(number).map(ParameterKind::name), Some(name));
         }

@@ -477,7 +477,8 @@ mod tests {
     fn what_is_in_progress_is_cancelled_when_it_is_withdrawn_and_tells_how_far_it_was() {
         let takeoff = Command::TakeOff { height_above_home_m: 5.0 };
         let id = MavCmd::MAV_CMD_NAV_TAKEOFF;
-        let progress = |percent| ardu::COMMAND_ACK_DATA { progress: percent, ..ack(id, MavResult::MAV_RESULT_IN_PROGRESS, OWN) };
+        let progress =
+            |percent| ardu::COMMAND_ACK_DATA { progress: percent, ..ack(id, MavResult::MAV_RESULT_IN_PROGRESS, OWN) };
         let begun = || {
             let mut commands = Commands::default();
             commands.submit(1, takeoff).unwrap();

@@ -14,7 +14,6 @@ use mavlink::dialects::ardupilotmega::{MavAutopilot, MavCmd, MavFrame, MavMessag
 use proptest::prelude::*;
 use script::{Dice, Script, Wire};
 
-
 const ARDU: MavAutopilot = MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA;
 const PX4: MavAutopilot = MavAutopilot::MAV_AUTOPILOT_PX4;
 

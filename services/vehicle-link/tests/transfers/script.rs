@@ -91,11 +91,8 @@ fn list(kind: MavMissionType) -> usize {
 }
 
 fn kind_of(list: usize) -> MavMissionType {
-    [
-        MavMissionType::MAV_MISSION_TYPE_MISSION,
-        MavMissionType::MAV_MISSION_TYPE_FENCE,
-        MavMissionType::MAV_MISSION_TYPE_RALLY,
-    ][list]
+    [MavMissionType::MAV_MISSION_TYPE_MISSION, MavMissionType::MAV_MISSION_TYPE_FENCE, MavMissionType::MAV_MISSION_TYPE_RALLY]
+        [list]
 }
 
 impl Script {
@@ -137,7 +134,12 @@ impl Script {
         self.out.push_back(if self.is_ardupilot() {
             MavMessage::MISSION_REQUEST(ardu::MISSION_REQUEST_DATA { seq, target_system, target_component, mission_type })
         } else {
-            MavMessage::MISSION_REQUEST_INT(ardu::MISSION_REQUEST_INT_DATA { seq, target_system, target_component, mission_type })
+            MavMessage::MISSION_REQUEST_INT(ardu::MISSION_REQUEST_INT_DATA {
+                seq,
+                target_system,
+                target_component,
+                mission_type,
+            })
         });
     }
 

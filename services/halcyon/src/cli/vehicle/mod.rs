@@ -95,7 +95,11 @@ async fn carry_out(client: &Client, command: Command, json: bool) -> anyhow::Res
         Command::List => list(client, json).await,
         Command::Show { id } => {
             let vehicle = client.send(Method::GET, &path(&id, "")?, None).await?;
-            if json { output::json(&vehicle)? } else { show(&vehicle)? }
+            if json {
+                output::json(&vehicle)?
+            } else {
+                show(&vehicle)?
+            }
             Ok(ExitCode::SUCCESS)
         }
         Command::Command { id, action } => told(client, &id, action.body(), json).await,
@@ -115,7 +119,11 @@ fn path(id: &str, what: &str) -> anyhow::Result<String> {
 
 async fn told(client: &Client, id: &str, body: Value, json: bool) -> anyhow::Result<ExitCode> {
     let answer = client.send(Method::POST, &path(id, "commands")?, Some(body)).await?;
-    if json { output::json(&answer)? } else { output::line(&format!("{id}: {}", text(&answer, "reason")))? }
+    if json {
+        output::json(&answer)?
+    } else {
+        output::line(&format!("{id}: {}", text(&answer, "reason")))?
+    }
     Ok(ExitCode::SUCCESS)
 }
 

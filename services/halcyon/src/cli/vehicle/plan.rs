@@ -193,7 +193,10 @@ mod tests {
     fn all_three_lists_are_read_and_written() {
         let mission = read(&sample(), ItemKind::Mission).unwrap();
         assert_eq!(mission.iter().map(|item| item.command).collect::<Vec<_>>(), [22, 16]);
-        assert_eq!((mission[0].parameters[3], mission[0].latitude_deg, mission[0].altitude_m), (None, Some(47.398_509_9), Some(50.0)));
+        assert_eq!(
+            (mission[0].parameters[3], mission[0].latitude_deg, mission[0].altitude_m),
+            (None, Some(47.398_509_9), Some(50.0))
+        );
         // MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION with the vertex count, MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION with the radius.
         let fence = read(&sample(), ItemKind::Fence).unwrap();
         let seen: Vec<_> = fence.iter().map(|item| (item.command, item.parameters[0].unwrap())).collect();

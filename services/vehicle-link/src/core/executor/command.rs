@@ -1,6 +1,8 @@
 //! Direct commands from people and from the planner. They work with the planner down.
 
-use halcyon_model::{FlightMode, ItemKind, LandedState, LocalPoint, Severity, Stamp, VehicleAction, VehicleCommand, VehicleState};
+use halcyon_model::{
+    FlightMode, ItemKind, LandedState, LocalPoint, Severity, Stamp, VehicleAction, VehicleCommand, VehicleState,
+};
 
 use super::{Direct, Executor, Goal};
 use crate::core::commands::Command;

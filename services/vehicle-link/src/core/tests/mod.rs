@@ -4,6 +4,6 @@ mod commands;
 mod failsafes;
 mod flights;
 mod formation;
-mod properties;
 mod payload;
+mod properties;
 mod world;
