@@ -31,13 +31,16 @@ pub(super) struct Args {
 #[derive(Debug, clap::Subcommand)]
 enum Command {
     /// List the vehicles
+    #[command(after_help = "Example: halcyon vehicle list --json")]
     List,
     /// Show one vehicle
+    #[command(after_help = "Example: halcyon vehicle show follower-1")]
     Show {
         /// Its id
         id: String,
     },
     /// Command a vehicle: arm, take off, go to, follow, hold, land, return …
+    #[command(after_help = "Example: halcyon vehicle command follower-1 go-to --north 30 --east 12 --height 6")]
     Command {
         /// Its id
         id: String,
@@ -45,26 +48,31 @@ enum Command {
         action: command::Action,
     },
     /// Read, set, save and load the autopilot's parameters
+    #[command(after_help = "Example: halcyon vehicle parameters load follower-1 tuned.param --dry-run")]
     Parameters {
         #[command(subcommand)]
         action: parameters::Action,
     },
     /// The mission that the autopilot keeps
+    #[command(after_help = "Example: halcyon vehicle mission upload follower-1 survey.plan")]
     Mission {
         #[command(subcommand)]
         action: items::Action,
     },
     /// The fence that the autopilot keeps
+    #[command(after_help = "Example: halcyon vehicle fence upload follower-1 site.plan")]
     Fence {
         #[command(subcommand)]
         action: items::Action,
     },
     /// The rally points that the autopilot keeps
+    #[command(after_help = "Example: halcyon vehicle rally show follower-1")]
     Rally {
         #[command(subcommand)]
         action: items::Action,
     },
     /// Let the payload go; on the ground or the water only
+    #[command(after_help = "Example: halcyon vehicle release follower-1")]
     Release {
         /// Its id
         id: String,
