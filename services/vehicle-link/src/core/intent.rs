@@ -185,7 +185,10 @@ mod tests {
             for ((velocity, acceleration), (dumb_velocity, dumb_acceleration)) in with.into_iter().zip(without) {
                 let share = if scale == 1.0 { 0.3 } else { 0.75 };
                 assert!(velocity < share * dumb_velocity, "{scale}: {velocity} m/s off, {dumb_velocity} without");
-                assert!(acceleration < share * dumb_acceleration, "{scale}: {acceleration} m/s² off, {dumb_acceleration} without");
+                assert!(
+                    acceleration < share * dumb_acceleration,
+                    "{scale}: {acceleration} m/s² off, {dumb_acceleration} without"
+                );
             }
         }
     }

@@ -90,3 +90,46 @@ fn the_same_scenario_gives_the_same_report_and_a_north_lock_does_not_swing() {
     assert_eq!(fly(&scenario), Ok(report));
     assert!(report.true_errors.slot_rms_m < 0.1, "{report:?}");
 }
+
+#[test]
+#[ignore]
+fn probe() {
+    use rayon::prelude::*;
+    let count: u64 = std::env::var("FLIGHTS").ok().and_then(|count| count.parse().ok()).unwrap_or(12);
+    let show = |name: String, scenario: Scenario| {
+        if std::env::var("ONLY").is_ok_and(|only| !name.contains(&only)) {
+            return;
+        }
+        let all: Vec<Report> =
+            (1..=count).into_par_iter().map(|seed| fly(&Scenario { seed, ..scenario.clone() }).unwrap()).collect();
+        let of = |f: fn(&Report) -> f64| all.iter().map(f).sum::<f64>() / all.len() as f64;
+        let worst = |f: fn(&Report) -> f64| all.iter().map(f).fold(0.0, f64::max);
+        let least = all.iter().map(|r| r.least_separation_m).fold(9.0, f64::min);
+        println!(
+            "{name}: range {:.3} (worst {:.3}) slot {:.3} ({:.3}) alt {:.3} ({:.3}) least {:.2} mean {:.2} true range {:.3} peak {:.2}",
+            of(|r| r.reported.range_rms_m),
+            worst(|r| r.reported.range_rms_m),
+            of(|r| r.true_errors.slot_rms_m),
+            worst(|r| r.true_errors.slot_rms_m),
+            of(|r| r.reported.altitude_rms_m),
+            worst(|r| r.reported.altitude_rms_m),
+            least,
+            of(|r| r.least_separation_m),
+            of(|r| r.true_errors.range_rms_m),
+            of(|r| r.slot_peak_m)
+        );
+    };
+    for (fname, flight) in [("square", Flight::SQUARE), ("sweep", Flight::SWEEP)] {
+        for shares_intent in [false, true] {
+            let base = Scenario { shares_intent, ..Scenario::new(Law::Halcyon, flight) };
+            let tag = format!("{fname} {}", if shares_intent { "shared" } else { "alone" });
+            show(format!("{tag} perfect"), base.clone());
+            show(format!("{tag} rtk"), Scenario { gnss: Gnss::Rtk, ..base.clone() });
+            show(format!("{tag} thesis"), Scenario { gnss: Gnss::Thesis, ..base.clone() });
+            show(format!("{tag} gains .7"), Scenario { gain_scale: 0.7, ..base.clone() });
+            show(format!("{tag} gains 1.3"), Scenario { gain_scale: 1.3, ..base.clone() });
+            show(format!("{tag} radio 200 ms 20 %"), Scenario { radio: Radio { delay_s: 0.2, loss: 0.2 }, ..base.clone() });
+            show(format!("{tag} radio 20 ms"), Scenario { radio: Radio { delay_s: 0.02, loss: 0.0 }, ..base.clone() });
+        }
+    }
+}
