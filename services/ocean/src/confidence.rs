@@ -22,7 +22,11 @@ pub fn chi_square_quantile(p: f64, dof: f64) -> f64 {
     let mut x = 0.5 * (low + high);
     for _ in 0..100 {
         let off = gamma_p(half, 0.5 * x) - p;
-        if off < 0.0 { low = x } else { high = x }
+        if off < 0.0 {
+            low = x
+        } else {
+            high = x
+        }
         let density = (front + (half - 1.0) * x.ln() - 0.5 * x).exp();
         let newton = x - off / density;
         let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };

@@ -306,7 +306,8 @@ mod tests {
     fn padding_adds_lines_and_no_variance() {
         let mut random = ChaCha8Rng::seed_from_u64(4);
         let noise = record(1000, 10.0, |_| random.sample(rand_distr::StandardNormal));
-        let (plain, padded) = (Welch::new(100).spectrum(&noise).unwrap(), Welch::new(100).spectrum_padded(&noise, 400).unwrap());
+        let (plain, padded) =
+            (Welch::new(100).spectrum(&noise).unwrap(), Welch::new(100).spectrum_padded(&noise, 400).unwrap());
         assert_relative_eq!(padded.df_hz(), plain.df_hz() / 4.0, max_relative = 1e-12);
         for (i, density) in plain.density_m2_per_hz().iter().enumerate() {
             assert_relative_eq!(padded.density_m2_per_hz()[4 * i], *density, max_relative = 1e-9);

@@ -16,9 +16,8 @@ fn draws(count: usize, severity: impl Fn(u64) -> f64 + Sync) -> Vec<Drawn> {
     std::thread::scope(|scope| {
         let severity = &severity;
         let one = move |seed: usize| draw(&CONDITIONS[0], seed as u64, severity(seed as u64)).unwrap();
-        let workers: Vec<_> = (0..threads)
-            .map(|t| scope.spawn(move || (t..count).step_by(threads).map(one).collect::<Vec<_>>()))
-            .collect();
+        let workers: Vec<_> =
+            (0..threads).map(|t| scope.spawn(move || (t..count).step_by(threads).map(one).collect::<Vec<_>>())).collect();
         workers.into_iter().flat_map(|worker| worker.join().unwrap()).collect()
     })
 }
@@ -69,6 +68,9 @@ fn water_a_fifth_below_the_limits_is_called_safe_within_a_minute() {
         );
     }
     let (safe, why) = (all.safe, &all.failed);
-    println!("{safe} of {count} seas a fifth below the limits are safe, {} were at some time; withheld for {why:?}", all.safe_ever);
+    println!(
+        "{safe} of {count} seas a fifth below the limits are safe, {} were at some time; withheld for {why:?}",
+        all.safe_ever
+    );
     assert!(safe * 100 >= 90 * count, "{safe} of {count}: {why:?}");
 }

@@ -220,7 +220,8 @@ fn the_published_record_has_its_published_waves() {
         println!("NOT CHECKED: {} is not there (set HALCYON_OCEANLYZ)", path.display());
         return;
     }
-    let options = WavesOptions { burst_s: Some(1024.0), band_hz: (0.05, 1.0), segment_s: 128.0, ..options(path.clone(), Some(2.0)) };
+    let options =
+        WavesOptions { burst_s: Some(1024.0), band_hz: (0.05, 1.0), segment_s: 128.0, ..options(path.clone(), Some(2.0)) };
     let report = waves(&options).unwrap();
     // H_m0, T_p, f_p, H_s, H_z, T_z, T_s as published, two decimals.
     #[allow(clippy::approx_constant, reason = "a period of 3.14 s is not π")]

@@ -53,7 +53,8 @@ pub(super) fn run(lab: &Lab) -> Result<Exhibit, LabError> {
                 .with(Series::points("", points))
                 .with(Series::dashed("perfect", vec![(0.0, 0.0), (1.0, 1.0)]))
                 .from_zero();
-            exhibit.chart(chart.svg(), format!("Reliability of the stated probability: {} seas, {}", all.seas, conditions.name))?;
+            exhibit
+                .chart(chart.svg(), format!("Reliability of the stated probability: {} seas, {}", all.seas, conditions.name))?;
         }
         rows.push(row(conditions, &all, &fit));
     }

@@ -123,7 +123,15 @@ impl Assessor {
     /// The look around that it is time for, if it is; to be taken anywhere, and what it finds to be [noticed](Self::notice).
     #[must_use]
     pub fn glance(&self) -> Option<Glance> {
-        Glance::due(&self.window, &self.config, self.statistics.as_ref(), &self.witness, self.is_trusted, self.around.as_ref(), self.filling)
+        Glance::due(
+            &self.window,
+            &self.config,
+            self.statistics.as_ref(),
+            &self.witness,
+            self.is_trusted,
+            self.around.as_ref(),
+            self.filling,
+        )
     }
 
     /// Takes in what a glance found. One from before the window was filled anew is of no use.
@@ -222,7 +230,11 @@ impl Assessor {
                 _ => rings.into_iter().collect(),
             },
             statistics,
-            witness: self.around.as_ref().and_then(|around| around.testimony(newest)).map(|said| (said.agrees, said.text.clone())),
+            witness: self
+                .around
+                .as_ref()
+                .and_then(|around| around.testimony(newest))
+                .map(|said| (said.agrees, said.text.clone())),
         };
         let judgement = judge(&evidence, &self.config, self.verdict);
         self.verdict = judgement.state;

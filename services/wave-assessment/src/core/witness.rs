@@ -99,8 +99,10 @@ impl Witness {
             scale_95: SCALE_95,
             ..Options::default()
         };
-        let (ours, theirs) =
-            (RawSeries { stamp_s: &trace_s, elevation_m: &trace_m }, RawSeries { stamp_s: &stamp_s, elevation_m: &elevation_m });
+        let (ours, theirs) = (
+            RawSeries { stamp_s: &trace_s, elevation_m: &trace_m },
+            RawSeries { stamp_s: &stamp_s, elevation_m: &elevation_m },
+        );
         let compared = compare(&ours, &theirs, &options).ok()?;
         let heights = format!("H_m0 {:.3} m by the cameras, {:.3} m by it", compared.a.h_m0_m, compared.b.h_m0_m);
         match agreement(&compared) {

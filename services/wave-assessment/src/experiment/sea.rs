@@ -163,8 +163,5 @@ impl Truth {
 /// Mean of the largest of n Rayleigh amplitudes over their parent's deviation: ∫ 1 − (1 − exp(−x²/2))ⁿ dx.
 pub(super) fn rayleigh_largest(n: f64) -> f64 {
     const STEP: f64 = 0.02;
-    (0..500)
-        .map(|i| (f64::from(i) + 0.5) * STEP)
-        .map(|x| (1.0 - (1.0 - (-0.5 * x * x).exp()).powf(n.max(1.0))) * STEP)
-        .sum()
+    (0..500).map(|i| (f64::from(i) + 0.5) * STEP).map(|x| (1.0 - (1.0 - (-0.5 * x * x).exp()).powf(n.max(1.0))) * STEP).sum()
 }

@@ -68,7 +68,8 @@ impl Checks {
         let early = if self.filled_root < 1.0 { format!(", {sure:.3} for an early look") } else { String::new() };
         let target =
             if margin < 1.0 { format!(" (by {:.0} % to become safe)", self.hysteresis * 100.0) } else { String::new() };
-        let text = format!("{what} {value:.3} {unit} ({low:.3} to {high:.3}{early}), {verb} the limit of {limit:.3} {unit}{target}");
+        let text =
+            format!("{what} {value:.3} {unit} ({low:.3} to {high:.3}{early}), {verb} the limit of {limit:.3} {unit}{target}");
         self.add(name, outcome, text);
         let under = probability_under(measured, limit);
         self.probability = Some(self.probability.map_or(under, |least| least.min(under)));
