@@ -92,6 +92,20 @@ impl Hidden {
     }
 }
 
+/// Variance of the elevation over all cells of all frames, m², less the cells' own errors: of the same waves as the gauges', from every cell, and
+/// whatever holes there are. `None` without levels or bends.
+pub(crate) fn whole_m2(window: &Window, hidden: &Hidden) -> Option<f64> {
+    let Hidden::Measured { frames: found, .. } = hidden else { return None };
+    let (mut sum_m2, mut count) = (0.0, 0.0);
+    for (frame, hidden) in window.frames().iter().zip(found) {
+        let (Some(bend), Some(hidden)) = (&frame.bend, hidden) else { continue };
+        let tilt = hidden.waves.slope.map_or([0.0; 2], |[east, north]| [east - bend.grid_slope[0], north - bend.grid_slope[1]]);
+        sum_m2 += bend.square_with_m2(hidden.waves.level_m, tilt) - bend.own_m2;
+        count += 1.0;
+    }
+    (count > 0.0).then(|| sum_m2 / count)
+}
+
 /// Splits levels and tilts of `window`.
 pub(crate) fn hidden(window: &Window, config: &Config, interval_s: f64) -> Hidden {
     let frames = window.frames();
