@@ -285,7 +285,7 @@ impl Autopilot {
     fn fitted(&self, effect: Effect) -> Option<Effect> {
         match effect {
             Effect::Send(message) => px4::fitted(message, self.telemetry.home_amsl_m()).map(Effect::Send),
-            done @ Effect::Done(..) => Some(done),
+            other @ (Effect::Done(..) | Effect::Transferred(..)) => Some(other),
         }
     }
 

@@ -36,7 +36,7 @@ const fn stream(message_id: u32, interval_us: u32, stall_s: f64) -> Stream {
 }
 
 /// What is asked for. Heartbeats come faster than the usual 1 Hz, since they tell that the pilot took over.
-pub const STREAMS: [Stream; 11] = [
+pub const STREAMS: [Stream; 12] = [
     stream(ardu::GLOBAL_POSITION_INT_DATA::ID, 100_000, 2.0),
     stream(ardu::ATTITUDE_QUATERNION_DATA::ID, 100_000, 2.0),
     // Where its local frame lies: setpoints with acceleration are taken only there.
