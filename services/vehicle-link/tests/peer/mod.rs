@@ -200,7 +200,7 @@ fn serve(wire: &dyn Wire, shared: &Arc<Shared>) {
             sequence = sequence.wrapping_add(1);
             count += 1;
             let lose = shared.lose_one_of.load(Ordering::Relaxed);
-            if lose != 0 && count % lose == 0 {
+            if count.is_multiple_of(lose) {
                 continue;
             }
             if shared.is_old.load(Ordering::Relaxed) {
