@@ -97,9 +97,17 @@ struct Udp(UdpSocket);
 
 impl Read for Udp {
     fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
-        let (length, from) = self.0.recv_from(buffer)?;
-        self.0.connect(from)?;
-        Ok(length)
+        loop {
+            match self.0.recv_from(buffer) {
+                Ok((length, from)) => {
+                    self.0.connect(from)?;
+                    return Ok(length);
+                }
+                // Nobody listened yet when it spoke: that is told here.
+                Err(error) if error.kind() == std::io::ErrorKind::ConnectionRefused => {}
+                Err(error) => return Err(error),
+            }
+        }
     }
 }
 
