@@ -57,7 +57,7 @@ async fn main() {
         if taken_s.len() >= SAMPLES || count > 4 * SAMPLES as u64 {
             break;
         }
-        tokio::time::sleep(Duration::from_millis(30)).await;
+        context.clock.sleep(Duration::from_millis(30)).await;
     }
     context.stop.cancel();
     taken_s.sort_unstable_by(f64::total_cmp);

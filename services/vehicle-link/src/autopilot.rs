@@ -366,11 +366,7 @@ mod tests {
                 Effect::Send(MavMessage::TIMESYNC(question)) => Some(question),
                 _ => None,
             });
-            for question in questions.collect::<Vec<_>>() {
-                // There in 80 ms, back in 80 ms; booted at t(-100).
-                let answer = ardu::TIMESYNC_DATA { tc1: ((100.0 + now_s + 0.08) * 1e9) as i64, ..question };
-                autopilot.observe(header, &MavMessage::TIMESYNC(answer), t(now_s + 0.16));
-            }
+            let questions: Vec<_> = questions.collect();
             let boot_ms = 100_000 + step as u32 * 100;
             let position = ardu::GLOBAL_POSITION_INT_DATA {
                 time_boot_ms: boot_ms,
@@ -386,6 +382,11 @@ mod tests {
             } else if step > 3 {
                 assert!(error_s.abs() < 1e-3, "{step}: {error_s}");
                 assert!((state.link.unwrap().round_trip_s.unwrap() - 0.16).abs() < 1e-3);
+            }
+            for question in questions {
+                // There in 80 ms, back in 80 ms; booted at t(-100).
+                let answer = ardu::TIMESYNC_DATA { tc1: ((100.0 + now_s + 0.08) * 1e9) as i64, ..question };
+                autopilot.observe(header, &MavMessage::TIMESYNC(answer), t(now_s + 0.16));
             }
         }
     }

@@ -98,7 +98,7 @@ impl Loss {
         let age_s = self.since.map_or(f64::INFINITY, |since| now.seconds_since(since));
         if !(0.0..=WINDOW_S).contains(&age_s) {
             // After a long silence the window before the last is as old as the silence.
-            self.previous = if age_s > 2.0 * WINDOW_S || age_s < 0.0 { Count::default() } else { self.current };
+            self.previous = if (0.0..=2.0 * WINDOW_S).contains(&age_s) { self.current } else { Count::default() };
             self.current = Count::default();
             self.since = Some(now);
         }

@@ -198,7 +198,7 @@ impl Keeper {
                         Ok(Err(error)) => return (heard, error.to_string()),
                         Ok(Ok((frames, from))) => {
                             for frame in frames {
-                                if self.incoming(frame, from, writer) {
+                                if self.incoming(&frame, from, writer) {
                                     heard = true;
                                     silent_since = self.clock.now();
                                 }
@@ -210,7 +210,7 @@ impl Keeper {
                     }
                     None
                 }
-                frame = self.relay.from_station(), if station_wait_s <= 0.0 => {
+                frame = self.relay.next_for_vehicle(), if station_wait_s <= 0.0 => {
                     budget.spend(frame.bytes().len());
                     let target = frame.message().and_then(|message| message.target_system_id()).unwrap_or(0);
                     Some((frame, if target == 0 { To::All } else { To::System(target) }))
@@ -258,10 +258,10 @@ impl Keeper {
     }
 
     /// A frame came; whether it is to be believed.
-    fn incoming(&mut self, frame: Frame, from: Option<std::net::SocketAddr>, writer: &mut Writer) -> bool {
+    fn incoming(&mut self, frame: &Frame, from: Option<std::net::SocketAddr>, writer: &mut Writer) -> bool {
         let now = self.clock.now();
         if let Some(signer) = &mut self.signer {
-            let verdict = signer.check(&frame, now);
+            let verdict = signer.check(frame, now);
             if !verdict.is_good() {
                 metrics::counter!("vehicle_link_frames_rejected_total", "reason" => verdict.word()).increment(1);
                 if self.told.is_none_or(|told| !(0.0..1.0).contains(&now.seconds_since(told))) {
@@ -287,7 +287,7 @@ impl Keeper {
                 LinkEvent::Unread(header)
             }
         };
-        self.relay.to_stations(&frame);
+        self.relay.to_stations(frame);
         if self.events.try_send(event).is_err() {
             metrics::counter!("vehicle_link_messages_dropped_total", "direction" => "in").increment(1);
         }

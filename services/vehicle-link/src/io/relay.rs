@@ -124,7 +124,7 @@ impl Relay {
     }
 
     /// The next frame for the vehicle. Cancel-safe.
-    pub(super) async fn from_station(&mut self) -> Frame {
+    pub(super) async fn next_for_vehicle(&mut self) -> Frame {
         match self.from_stations.recv().await {
             Some(frame) => frame,
             None => std::future::pending().await,

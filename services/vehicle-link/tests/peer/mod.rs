@@ -97,9 +97,17 @@ struct Udp(UdpSocket);
 
 impl Read for Udp {
     fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
-        let (length, from) = self.0.recv_from(buffer)?;
-        self.0.connect(from)?;
-        Ok(length)
+        loop {
+            match self.0.recv_from(buffer) {
+                Ok((length, from)) => {
+                    self.0.connect(from)?;
+                    return Ok(length);
+                }
+                // Nobody listened yet when it spoke: that is told here.
+                Err(error) if error.kind() == std::io::ErrorKind::ConnectionRefused => {}
+                Err(error) => return Err(error),
+            }
+        }
     }
 }
 
@@ -200,7 +208,7 @@ fn serve(wire: &dyn Wire, shared: &Arc<Shared>) {
             sequence = sequence.wrapping_add(1);
             count += 1;
             let lose = shared.lose_one_of.load(Ordering::Relaxed);
-            if lose != 0 && count % lose == 0 {
+            if count.is_multiple_of(lose) {
                 continue;
             }
             if shared.is_old.load(Ordering::Relaxed) {
