@@ -273,7 +273,11 @@ impl<'a> Service<'a> {
             };
             self.event(event).await;
         }
-        incoming.reply(&reply).await;
+        if reply.content.is_some() {
+            incoming.reply_twice(reply);
+        } else {
+            incoming.reply(&reply).await;
+        }
     }
 
     /// Says every few seconds how far a long transfer is.

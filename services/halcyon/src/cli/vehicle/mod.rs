@@ -41,7 +41,8 @@ enum Command {
     },
     /// Command a vehicle: arm, take off, go to, follow, hold, land, return …
     #[command(after_help = "Example: halcyon vehicle command follower-1 go-to --north 30 --east 12 --height 6")]
-    Command {
+    #[command(name = "command")]
+    Tell {
         /// Its id
         id: String,
         #[command(subcommand)]
@@ -92,13 +93,13 @@ async fn carry_out(client: &Client, command: Command, json: bool) -> anyhow::Res
         Command::Show { id } => {
             let vehicle = client.send(Method::GET, &path(&id, "")?, None).await?;
             if json {
-                output::json(&vehicle)?
+                output::json(&vehicle)?;
             } else {
-                show(&vehicle)?
+                show(&vehicle)?;
             }
             Ok(ExitCode::SUCCESS)
         }
-        Command::Command { id, action } => told(client, &id, action.body(), json).await,
+        Command::Tell { id, action } => told(client, &id, action.body(), json).await,
         Command::Release { id } => told(client, &id, json!({ "action": "release_payload" }), json).await,
         Command::Parameters { action } => parameters::run(client, action, json).await,
         Command::Mission { action } => items::run(client, ItemKind::Mission, action, json).await,
@@ -116,9 +117,9 @@ fn path(id: &str, what: &str) -> anyhow::Result<String> {
 async fn told(client: &Client, id: &str, body: Value, json: bool) -> anyhow::Result<ExitCode> {
     let answer = client.send(Method::POST, &path(id, "commands")?, Some(body)).await?;
     if json {
-        output::json(&answer)?
+        output::json(&answer)?;
     } else {
-        output::line(&format!("{id}: {}", text(&answer, "reason")))?
+        output::line(&format!("{id}: {}", text(&answer, "reason")))?;
     }
     Ok(ExitCode::SUCCESS)
 }
