@@ -14,6 +14,9 @@ use super::{Exposure, Next, StereoSource};
 use crate::config::Config;
 use crate::core::pose::{PoseHistory, PoseSample};
 
+/// An attitude this much older than what it came with is no pose: the autopilot has stopped telling it, seconds.
+const ATTITUDE_S_MAX: f64 = 0.5;
+
 /// How long a camera takes from mid-exposure until the picture is here, seconds: by then both poses about it are known.
 const READOUT_S: f64 = 0.1;
 /// The simulator's truth may be this much older than the exposure and is then carried forward, seconds.
@@ -143,6 +146,9 @@ impl StereoSource for SimSource {
                 }
                 state = self.states.recv() => {
                     let state = state?;
+                    if state.ages.attitude_s.is_some_and(|age_s| age_s > ATTITUDE_S_MAX) {
+                        continue;
+                    }
                     self.state.push(PoseSample {
                         stamp: state.stamp,
                         position_ned_m: state.position_ned_m,

@@ -467,13 +467,13 @@ mod tests {
         let effects = commands.poll(to(), &Texts::default(), t(1.2));
         assert_eq!(stop(&effects), 1);
         // Not even the pilot's mode change withdraws it, if a person asked.
-        assert!(commands.withdraw(None).is_empty());
+        assert!(commands.withdraw(None, None).is_empty());
         commands.observe_ack(&accepted, OWN.0, OWN.1, t(1.3));
         let effects = commands.poll(to(), &Texts::default(), t(1.3));
         assert!(matches!(effects[..], [Effect::Done(99, Command::Disarm { force: true }, Ok(()))]), "{effects:?}");
         // Our own is.
         commands.submit(0, Command::Disarm { force: true }).unwrap();
-        assert_eq!(commands.withdraw(None).len(), 1);
+        assert_eq!(commands.withdraw(None, None).len(), 1);
     }
 
     #[test]

@@ -32,8 +32,10 @@ const DISTANCE_SENSOR_S: f64 = 2.0;
 const SIGNAL_INVALID: u8 = 1;
 /// What is dated further ahead of now than this is not fresh, seconds.
 const AHEAD_S: f64 = 0.5;
-/// Home whose height changes in flight by more than this was set anew, metres; less is its own wander after arming.
+/// Home whose height changes in flight by more than this was set anew, metres; less is its own wander.
 const HOME_MOVED_M: f64 = 2.0;
+/// The home that the autopilot sets when it arms may be heard so late, seconds after it left the ground.
+const HOME_LATE_S: f64 = 5.0;
 /// The boot clock's offset to the fleet's is the least delay seen in the last one to two of these, seconds.
 const OFFSET_WINDOW_S: f64 = 10.0;
 
@@ -73,6 +75,7 @@ pub struct Telemetry {
     home: Option<Aged<Geodetic>>,
     /// Home when it left the ground.
     home_of_flight: Option<Geodetic>,
+    off_the_ground_since: Option<Stamp>,
     motion: Differentiator,
     /// `None` within: out of its range.
     range: Option<Aged<Option<f64>>>,
@@ -100,6 +103,7 @@ impl Telemetry {
             attitude: None,
             home: None,
             home_of_flight: None,
+            off_the_ground_since: None,
             motion: Differentiator::default(),
             range: None,
             distance_sensor_heard: None,
@@ -145,7 +149,8 @@ impl Telemetry {
             }
             MavMessage::HOME_POSITION(data) => {
                 self.home = geodetic(data.latitude, data.longitude, data.altitude).map(|home| Aged(home, now));
-                if self.home_of_flight.is_none() || !self.off_the_ground() {
+                let late = self.off_the_ground_since.is_none_or(|since| now.seconds_since(since) <= HOME_LATE_S);
+                if self.home_of_flight.is_none() || late {
                     self.home_of_flight = self.home.map(|home| home.0);
                 }
             }
@@ -165,7 +170,10 @@ impl Telemetry {
                 let distance_m = f64::from(data.distance);
                 self.range = Some(Aged((distance_m > 0.0 && distance_m.is_finite()).then_some(distance_m), now));
             }
-            MavMessage::EXTENDED_SYS_STATE(data) => self.landed = Some(Aged(landed(data.landed_state), now)),
+            MavMessage::EXTENDED_SYS_STATE(data) => {
+                self.landed = Some(Aged(landed(data.landed_state), now));
+                self.off_the_ground_since = self.off_the_ground().then(|| self.off_the_ground_since.unwrap_or(now));
+            }
             MavMessage::SYS_STATUS(data) => self.observe_sys_status(data, now),
             MavMessage::BATTERY_STATUS(data) if data.id == 0 => self.observe_battery(data, now),
             MavMessage::GPS_RAW_INT(data) => {
@@ -243,7 +251,7 @@ impl Telemetry {
         }
     }
 
-    /// Known to be in the air: only then does a new home change nothing.
+    /// Known to be in the air.
     fn off_the_ground(&self) -> bool {
         let armed = self.heartbeat.is_some_and(|heartbeat| heartbeat.0.1);
         armed && self.landed.is_some_and(|landed| matches!(landed.0, LandedState::InAir | LandedState::Landing))
@@ -251,8 +259,9 @@ impl Telemetry {
 
     /// What the autopilot's relative altitude lacks because its home was set anew in flight, metres.
     fn home_rise_m(&self) -> f64 {
+        let off_the_ground = self.off_the_ground_since.is_some();
         let rise_m = self.home.zip(self.home_of_flight).map_or(0.0, |(home, flight)| home.0.altitude_m - flight.altitude_m);
-        if self.off_the_ground() && rise_m.abs() > HOME_MOVED_M { rise_m } else { 0.0 }
+        if off_the_ground && rise_m.abs() > HOME_MOVED_M { rise_m } else { 0.0 }
     }
 
     /// When the autopilot was last heard.
@@ -581,8 +590,12 @@ mod tests {
         telemetry.observe(&home(226.0), t(0.1));
         telemetry.observe(&landed(ardu::MavLandedState::MAV_LANDED_STATE_IN_AIR), t(0.2));
         assert_eq!(telemetry.state(t(0.3)).unwrap().position_ned_m.z, -6.5);
+        // The one that it set when it armed, heard late, counts.
+        telemetry.observe(&home(223.0), t(1.0));
+        assert_eq!(telemetry.state(t(1.0)).unwrap().position_ned_m.z, -6.5);
+        telemetry.observe(&home(226.0), t(2.0));
         // Set where it hovers, 5 m up: relative altitude 0.
-        telemetry.observe(&home(231.0), t(0.4));
+        telemetry.observe(&home(231.0), t(9.4));
         let position = ardu::GLOBAL_POSITION_INT_DATA {
             time_boot_ms: 50_400,
             lat: 450_010_000,
@@ -590,8 +603,8 @@ mod tests {
             alt: 231_000,
             ..Default::default()
         };
-        telemetry.observe(&MavMessage::GLOBAL_POSITION_INT(position), t(0.4));
-        assert_eq!(telemetry.state(t(0.5)).unwrap().position_ned_m.z, -6.5);
+        telemetry.observe(&MavMessage::GLOBAL_POSITION_INT(position), t(9.4));
+        assert_eq!(telemetry.state(t(9.5)).unwrap().position_ned_m.z, -6.5);
     }
 
     /// Messages delayed by a queue are still dated when they were measured; a restarted autopilot starts the offset afresh.

@@ -20,6 +20,8 @@ const BACK_S: f64 = 1.0;
 const HELD_UP_S: f64 = 5.0;
 /// Home that moved in flight by more than this is not flown to, metres.
 const HOME_MOVED_M: f64 = 5.0;
+/// The home that the autopilot sets when it arms may be heard so late, seconds after it left the ground.
+const HOME_LATE_S: f64 = 5.0;
 /// Own stamps remembered, to know our own voice by: several seconds of them.
 const OWN_STAMPS_MAX: usize = 128;
 /// So many states under our name that we didn't say are another vehicle's; and it is gone after so long a silence, seconds.
@@ -60,6 +62,7 @@ pub(super) struct Watch {
     /// Home as it was when the vehicle left the ground.
     home: Option<Geodetic>,
     home_moved: bool,
+    off_the_ground: Option<Stamp>,
     own_stamps: VecDeque<Stamp>,
     twin: Option<Twin>,
 }
@@ -162,7 +165,7 @@ impl Executor {
             }
             self.watch.jumped = Some(Jumped { by_m: before_m + by_m, at: now });
         }
-        self.watch_home(state);
+        self.watch_home(state, now);
     }
 
     fn autopilot_restarted(&mut self) {
@@ -181,8 +184,11 @@ impl Executor {
         self.note(severity, what, "hands off until GUIDED is set");
     }
 
-    fn watch_home(&mut self, state: &VehicleState) {
-        if !self.airborne {
+    fn watch_home(&mut self, state: &VehicleState, now: Stamp) {
+        self.watch.off_the_ground = self.airborne.then(|| self.watch.off_the_ground.unwrap_or(now));
+        // In the air already when it was first heard, its home is as good as any.
+        let late = self.own.is_some() && self.watch.off_the_ground.is_none_or(|at| now.seconds_since(at) < HOME_LATE_S);
+        if late && state.home.is_some() {
             self.watch.home = state.home;
             self.watch.home_moved = false;
             return;

@@ -74,6 +74,8 @@ fn a_silent_leader_is_predicted_then_waited_for_then_given_up() {
     world.copters[0].silent = false;
     world.until(10.0, keep_following, |world| matches!(world.activity(1), Activity::Following { settled: true, .. }));
     world.copters[0].silent = true;
+    // At 5 s it is given up and flown home, not waited for again.
+    world.until(9.0, keep_following, |world| (world.copters[1].position - place).norm() > 4.0);
     world.until(120.0, keep_following, |world| down(world, 1));
     assert!((world.copters[1].position - Vector3::new(0.0, -8.0, 0.0)).norm() < 0.5);
 }
