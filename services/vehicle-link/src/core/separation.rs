@@ -28,6 +28,9 @@ const CHASE_HZ: f64 = 1.0;
 /// A silent vehicle may have gone anywhere: its kept distance grows by this much a second, up to [`GROWTH_M_MAX`].
 const GROWTH_MPS: f64 = 0.5;
 const GROWTH_M_MAX: f64 = 3.0;
+/// A state is carried on for so long, seconds; then the vehicle may stand there, or may fly on, for so long.
+const STOPPED_S: f64 = 1.0;
+const ONWARD_S_MAX: f64 = 5.0;
 /// A flying vehicle of which nothing has come for so long is forgotten, seconds; a parked one stays where it was.
 const FORGET_S: f64 = 30.0;
 /// Passes over all constraints; a handful of vehicles needs two or three, ten in a crowd some dozen.
@@ -75,6 +78,21 @@ pub fn obstacle(track: &Track, own_follows: bool, limits: &Limits, now: Stamp) -
         keep_m: limits.separation_m_min + limits.separation_margin_m + growth_m,
         yields_beyond_m: (it_follows && !own_follows).then_some(limits.separation_m_min),
     })
+}
+
+/// Where a vehicle is that has been silent for more than a second and has not stopped, as [`obstacle`] has it, but flies on: nobody
+/// knows which. `None` once it may be anywhere.
+#[must_use]
+pub fn onward(track: &Track, own_follows: bool, limits: &Limits, now: Stamp) -> Option<Obstacle> {
+    let silent_s = track.silent_s(now);
+    if track.parked() || !(STOPPED_S..ONWARD_S_MAX).contains(&silent_s) {
+        return None;
+    }
+    let stopped = obstacle(track, own_follows, limits, now)?;
+    let velocity_ned_mps = track.predict(now, 0.0).velocity_ned_mps;
+    let position_ned_m = stopped.position_ned_m + velocity_ned_mps * (silent_s - STOPPED_S);
+    let keep_m = limits.separation_m_min + limits.separation_margin_m;
+    Some(Obstacle { position_ned_m, velocity_ned_mps, keep_m, ..stopped })
 }
 
 /// Least opening speed (negative: greatest closing speed) at a gap to the kept distance, metres per second.
