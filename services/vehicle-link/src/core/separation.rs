@@ -7,6 +7,9 @@
 //! Who follows gives way: a vehicle that isn't following is not pushed along by one that is, or the two would drive each other
 //! faster and faster (the follower after its slot, the leader away from the follower). Inside the least separation nobody waits
 //! for the other.
+//!
+//! Where several leave a way, the nearest velocity to the wanted one that keeps every distance is taken; where they leave none, the
+//! one that breaks them least.
 
 use nalgebra::Vector3;
 
@@ -232,7 +235,10 @@ pub fn filter(
 
 #[cfg(test)]
 mod tests {
+    use halcyon_model::VehicleState;
+
     use super::*;
+    use crate::core::track::tests::{state, t};
 
     fn still(x: f64, y: f64, z: f64) -> Obstacle {
         Obstacle {
@@ -344,5 +350,20 @@ mod tests {
             .collect();
         let velocity = filter(Vector3::new(0.0, 0.0, 0.0), [own, own], own, &ring, &limits);
         assert!(velocity.norm() < 0.05, "{velocity}");
+    }
+
+    /// At 3 m/s, silent for 3 s: it may stand where its last second brought it, 3 m on, or be 9 m on.
+    #[test]
+    fn a_silent_vehicle_may_have_stopped_or_flown_on() {
+        let limits = Limits::default();
+        let moving = VehicleState { velocity_ned_mps: Vector3::new(3.0, 0.0, 0.0), ..state(t(0.0), 0.0) };
+        let track = Track::new(moving, t(0.0));
+        assert_eq!(onward(&track, false, &limits, t(0.9)), None);
+        let stopped = obstacle(&track, false, &limits, t(3.0)).unwrap();
+        let flown = onward(&track, false, &limits, t(3.0)).unwrap();
+        assert!((stopped.position_ned_m.x - 3.0).abs() < 1e-9 && stopped.velocity_ned_mps.norm() == 0.0);
+        assert!((flown.position_ned_m.x - 9.0).abs() < 1e-9 && (flown.velocity_ned_mps.x - 3.0).abs() < 1e-9);
+        assert!(flown.keep_m < stopped.keep_m);
+        assert_eq!(onward(&track, false, &limits, t(5.1)), None, "it may be anywhere");
     }
 }
