@@ -15,8 +15,9 @@
 //! | [`core::payload`] | what holds the payload |
 //! | [`core::guidance`], [`core::separation`], [`core::track`] | the slot, the way there, the distance to everyone |
 //! | [`core::law`], [`core::observer`], [`core::inverse`] | the named laws, the leader's motion, the follower's own lag |
+//! | [`core::intent`], [`core::continuity`] | the leader's own setpoint; places without their receivers' leaps |
 //! | [`core::local`] | the autopilot's local frame, the only one in which it takes accelerations |
-//! | `experiment` | the thesis's formation flights against the simulator; behind a feature of that name |
+//! | `experiment` | the thesis's formation flights against the simulator, and many vehicles through bad radio; behind a feature of that name |
 //! | [`core::interlock`], [`core::failsafe`], [`core::control`] | when not to; the table of fail-safes; the pilot |
 //! | [`core::executor`] | reality made to match the newest plan or a direct command |
 //! | [`io::link`] | sockets and serial ports that come back, and ground stations beside them |

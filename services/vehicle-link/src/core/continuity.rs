@@ -31,7 +31,7 @@ impl Continuity {
         let now = (stamp, position_ned_m, velocity_ned_mps);
         let Some((last_stamp, last_m, last_mps)) = self.last.replace(now) else { return };
         let dt_s = stamp.seconds_since(last_stamp);
-        if dt_s < 0.0 || dt_s > GAP_S_MAX {
+        if !(0.0..=GAP_S_MAX).contains(&dt_s) {
             self.shift_ned_m = Vector3::zeros();
             return;
         }
