@@ -91,11 +91,11 @@ fn a_rangefinder_that_sees_the_same_waves_agrees() {
     assert_eq!((said(&found), found.verdict.state), (Some(true), VerdictState::Safe), "{:#?}", found.verdict.reasons);
 }
 
-/// Higher ones, ones upside down, and none at all.
+/// Higher ones, and none at all.
 #[test]
 fn one_that_sees_other_waves_makes_nothing_known() {
     let sea = Sea::jonswap(0.06, 1.5, 2);
-    for factor in [2.0, -1.0, 0.0] {
+    for factor in [2.0, 0.0] {
         let found = watched("leader-1", &sea, |t_s| Some(factor * at_middle(&sea, t_s)));
         assert_eq!((said(&found), found.verdict.state), (Some(false), VerdictState::Inconclusive), "{factor}");
         assert_eq!(found.verdict.probability, None);
