@@ -29,14 +29,17 @@ async def watched(system, watch, figures):
     watch.start("position", "velocity_ned", "position_velocity_ned", "landed_state", "armed", "flight_mode", "health", "battery", "home")
     kinds = {"position", "position_velocity_ned", "landed_state", "armed", "flight_mode", "health", "battery", "home"}
     await watch.until("everything that is needed", lambda latest: kinds <= latest.keys(), 20)
-    check("it is armed", watch.latest["armed"])
-    # MAVSDK calls GUIDED so.
-    check("it flies in GUIDED", watch.latest["flight_mode"] == FlightMode.OFFBOARD, watch.latest["flight_mode"])
-    check("it is in the air", watch.latest["landed_state"] == LandedState.IN_AIR)
-    check("its position is good", watch.latest["health"].is_global_position_ok)
+    # Each of these is put together from several messages, and first told before all of them came. MAVSDK calls GUIDED OFFBOARD.
+    for what, done in (
+        ("armed", lambda latest: latest["armed"]),
+        ("GUIDED", lambda latest: latest["flight_mode"] == FlightMode.OFFBOARD),
+        ("in the air", lambda latest: latest["landed_state"] == LandedState.IN_AIR),
+        ("a good position", lambda latest: latest["health"].is_global_position_ok),
+        ("up", lambda latest: 4 < latest["position"].relative_altitude_m < 8),
+        ("a known battery", lambda latest: 0 < latest["battery"].remaining_percent <= 100),
+    ):
+        await watch.until(what, done, 10)
     figures["height_m"] = round(watch.latest["position"].relative_altitude_m, 2)
-    check("it is up", 4 < figures["height_m"] < 8, figures)
-    check("its battery is known", 0 < watch.latest["battery"].remaining_percent <= 100)
     param = ParamAsync(system)
     before = await param.get_param_float("WPNAV_SPEED")
     await param.set_param_float("WPNAV_SPEED", before + 50)

@@ -87,6 +87,7 @@ fn ground_stations_watch_through_the_relay_and_take_over() {
 
     // Asked for, it flies again.
     host.command("GUIDED is accepted", &json!({ "action": "set_mode", "parameters": { "mode": "GUIDED" } }));
+    host.command("it takes commands again", &json!({ "action": "hold" }));
     host.comes_to("it flies again", |vehicle| vehicle["activity"]["kind"] == "holding");
 
     // MAVSDK over TCP: it watches, stops the vehicle, and lands it.

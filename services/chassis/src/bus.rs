@@ -215,6 +215,8 @@ impl Bus {
             .priority(zenoh::qos::Priority::InteractiveHigh)
             // The answer inherits it: a vehicle must not wait for a stalled link in order to say no.
             .congestion_control(CongestionControl::Drop)
+            // The first answer is the answer; nothing is held back until the query has ended.
+            .consolidation(zenoh::query::ConsolidationMode::None)
             .timeout(timeout)
             .with(zenoh::handlers::FifoChannel::new(4))
             .await
@@ -444,6 +446,23 @@ impl<C> Incoming<C> {
     pub async fn reply(self, reply: &CommandReply) {
         send_reply(&self.query, reply).await;
     }
+}
+
+impl<C: Send + 'static> Incoming<C> {
+    /// Answers with much: on a task of its own, and once more a moment later, since the bus drops what a busy link cannot take
+    /// at once. Whoever asked takes the first that comes.
+    pub fn reply_twice(self, reply: CommandReply) {
+        tokio::spawn(async move {
+            send_reply(&self.query, &reply).await;
+            pause().await;
+            send_reply(&self.query, &reply).await;
+        });
+    }
+}
+
+#[allow(clippy::disallowed_methods, reason = "a busy link is a matter of wall time")]
+async fn pause() {
+    tokio::time::sleep(Duration::from_millis(100)).await;
 }
 
 async fn send_reply(query: &zenoh::query::Query, reply: &CommandReply) {

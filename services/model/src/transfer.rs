@@ -258,12 +258,12 @@ impl Item {
         let place = [self.latitude_deg, self.longitude_deg, self.altitude_m];
         let names = ["latitude_deg", "longitude_deg", "altitude_m"];
         for ((name, value), bound) in names.into_iter().zip(place).zip(bounds) {
-            // Written so that NaN fails, too.
-            if value.is_some_and(|value| !(value.abs() <= bound)) {
+            // A range, so that NaN fails, too.
+            if value.is_some_and(|value| !(-bound..=bound).contains(&value)) {
                 return Some(format!("{name} must be -{bound} to {bound}, not {}", value.unwrap_or_default()));
             }
         }
-        let wild = self.parameters.iter().flatten().find(|value| !(value.abs() <= parameter_max));
+        let wild = self.parameters.iter().flatten().find(|value| !(-parameter_max..=parameter_max).contains(*value));
         wild.map(|value| format!("a parameter cannot be {value}"))
     }
 }

@@ -245,6 +245,33 @@ fn rtl_climbs_returns_and_lands_at_home() {
     assert!(field.vehicle.truth().position_ned_m.xy().norm() < 0.2, "{}", field.vehicle.truth().position_ned_m);
 }
 
+/// Home is where it armed last, unless somebody has set it.
+#[test]
+fn arming_moves_home_until_it_is_set() {
+    let mut field = Field::new(&perfect());
+    let fly_and_land = |field: &mut Field, north_m: f32| {
+        field.take_off(4.0);
+        field.target(POSITION, [north_m, 0.0, -4.0], [0.0; 3]);
+        field.run(12.0);
+        field.set_mode(Mode::Land);
+        field.until(40.0, "landing", |vehicle| !vehicle.autopilot().is_armed());
+    };
+    let home_north_m = |field: &Field| {
+        field.heard.iter().rev().find_map(|message| match message {
+            MavMessage::HOME_POSITION(data) => Some(f64::from(data.latitude - 531_000_000) / 89.84),
+            _ => None,
+        })
+    };
+    fly_and_land(&mut field, 10.0);
+    assert!(home_north_m(&field).is_some_and(|north_m| north_m.abs() < 0.1));
+    fly_and_land(&mut field, 20.0);
+    assert!(home_north_m(&field).is_some_and(|north_m| (north_m - 10.0).abs() < 0.3), "where it armed the second time");
+    assert_eq!(field.command(MavCmd::MAV_CMD_DO_SET_HOME, [0.0; 7]), MavResult::MAV_RESULT_ACCEPTED);
+    fly_and_land(&mut field, 30.0);
+    fly_and_land(&mut field, 30.0);
+    assert!(home_north_m(&field).is_some_and(|north_m| (north_m - 20.0).abs() < 0.3), "where it was set");
+}
+
 #[test]
 fn loss_of_gnss_lands_it() {
     let mut field = Field::new(&real());

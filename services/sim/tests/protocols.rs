@@ -1,6 +1,6 @@
 //! What ground stations say to an autopilot beside flying it: items, signatures, clocks, payloads, sensors.
 #![allow(deprecated, reason = "ArduPilot still speaks much that MAVLink has deprecated")]
-#![allow(clippy::expect_used, reason = "a test without its vehicle cannot go on")]
+#![allow(clippy::expect_used, clippy::panic, reason = "a test without its vehicle cannot go on")]
 
 mod field;
 

@@ -13,12 +13,14 @@ use halcyon_model::{CommandReply, Stamp, VehicleAction, VehicleCommand, VehicleI
 use tracing::{debug, info, trace, warn};
 
 use crate::autopilot::Autopilot;
-use crate::config::Config;
+use crate::config::{Config, Signing};
 use crate::core::commands::{Command, CommandError, Effect, Ticket};
 use crate::core::encode;
 use crate::core::executor::{Decision, Executor, ExecutorConfig, Output, PlanAnswer, word};
+use crate::core::signing::{self, Signer, Verdict};
 use crate::core::transfers::Ending;
-use crate::io::link::{Link, LinkEvent};
+use crate::io::key;
+use crate::io::link::{Link, LinkEvent, LinkOptions};
 
 /// Commands that wait for the autopilot's answer at once; more are refused.
 const WAITING_MAX: usize = 16;
@@ -26,6 +28,10 @@ const WAITING_MAX: usize = 16;
 const STEP_S_MIN: f64 = 0.02;
 /// People are told how far a long transfer is this often, seconds.
 const TELL_S: f64 = 5.0;
+/// A greater share of lost frames is told.
+const LOSS_MAX: f64 = 0.2;
+/// So long after the last frame with a foreign signature that is still told, seconds.
+const REJECTED_S: f64 = 5.0;
 
 /// Runs until `context.stop`.
 ///
@@ -37,7 +43,7 @@ pub async fn run(context: Context, config: Config) -> anyhow::Result<()> {
     let mut others = context.bus.subscribe(&topics::vehicle_states()).await?;
     let mut commands = context.bus.serve(&topics::vehicle_command(&vehicle)).await?;
     let states = context.bus.publisher(&topics::vehicle_state(&vehicle)).await?;
-    let mut link = Link::start(config.endpoint.clone(), context.clock.clone(), context.stop.child_token());
+    let mut link = Link::start(link_options(&config)?, context.clock.clone(), context.stop.child_token());
     let mut guidance = context.clock.every(Duration::from_secs_f64(1.0 / config.guidance_rate_hz));
     let mut publishing = context.clock.every(Duration::from_secs_f64(1.0 / config.state_rate_hz));
     let mut heartbeat = context.clock.every(Duration::from_secs(1));
@@ -68,6 +74,14 @@ pub async fn run(context: Context, config: Config) -> anyhow::Result<()> {
     }
 }
 
+fn link_options(config: &Config) -> anyhow::Result<LinkOptions> {
+    let Signing { key_file, link_id } = &config.signing;
+    let signer = if key_file.as_os_str().is_empty() { None } else { Some(Signer::new(key::read(key_file)?, *link_id)) };
+    let parse = |place: &String| place.parse().map_err(anyhow::Error::msg);
+    let relay = config.relay.iter().map(parse).collect::<anyhow::Result<_>>()?;
+    Ok(LinkOptions { endpoint: parse(&config.endpoint)?, signer, relay })
+}
+
 struct Service<'a> {
     context: &'a Context,
     vehicle: VehicleId,
@@ -77,6 +91,8 @@ struct Service<'a> {
     waiting: BTreeMap<Ticket, Incoming<VehicleCommand>>,
     next_ticket: Ticket,
     link_problem: Option<String>,
+    signs: bool,
+    rejected: Option<(Stamp, Verdict)>,
     published: Option<Stamp>,
     stepped: Option<Stamp>,
     told: Option<Stamp>,
@@ -104,6 +120,8 @@ impl<'a> Service<'a> {
             waiting: BTreeMap::new(),
             next_ticket: 1,
             link_problem,
+            signs: !config.signing.key_file.as_os_str().is_empty(),
+            rejected: None,
             published: None,
             stepped: None,
             told: None,
@@ -129,6 +147,9 @@ impl<'a> Service<'a> {
             LinkEvent::Message(header, message) => {
                 let now = self.context.clock.now();
                 let heard = self.autopilot.observe(header, &message, now);
+                if let Some(reply) = heard.reply {
+                    link.send(self.autopilot.header(), reply);
+                }
                 if let Some(system) = heard.found {
                     self.link_problem = None;
                     self.event(EventDraft::info("autopilot found", format!("MAVLink system {system}"))).await;
@@ -146,6 +167,15 @@ impl<'a> Service<'a> {
                 {
                     self.executor.observe_self(state, mode_heard, now);
                 }
+            }
+            LinkEvent::Unread(header) => self.autopilot.observe_unread(header, self.context.clock.now()),
+            LinkEvent::Rejected(verdict) => {
+                let now = self.context.clock.now();
+                if self.rejected.is_none_or(|(at, _)| now.seconds_since(at) > REJECTED_S) {
+                    let why = format!("dropped; the first was {}", verdict.word().replace('_', " "));
+                    self.event(EventDraft::warning("frames without our signature", why)).await;
+                }
+                self.rejected = Some((now, verdict));
             }
         }
     }
@@ -187,7 +217,7 @@ impl<'a> Service<'a> {
         let effects = self.autopilot.poll(now);
         self.carry_out(effects, link).await;
         self.tell_progress(now).await;
-        self.report();
+        self.report(now, link);
     }
 
     async fn carry_out(&mut self, effects: Vec<Effect>, link: &Link) {
@@ -243,7 +273,11 @@ impl<'a> Service<'a> {
             };
             self.event(event).await;
         }
-        incoming.reply(&reply).await;
+        if reply.content.is_some() {
+            incoming.reply_twice(reply);
+        } else {
+            incoming.reply(&reply).await;
+        }
     }
 
     /// Says every few seconds how far a long transfer is.
@@ -321,8 +355,29 @@ impl<'a> Service<'a> {
         Ok(())
     }
 
-    fn report(&self) {
-        match (&self.link_problem, self.autopilot.missing()) {
+    /// What is wrong though messages come.
+    fn link_flaw(&self, now: Stamp, link: &Link) -> Option<String> {
+        if self.signs && !signing::clock_can_sign(now) {
+            return Some("the clock is before 2015: nothing can be signed, so nothing is sent".into());
+        }
+        if let Some((at, verdict)) = self.rejected
+            && now.seconds_since(at) <= REJECTED_S
+        {
+            return Some(format!("frames without our signature ({})", verdict.word().replace('_', " ")));
+        }
+        if self.autopilot.loss() > LOSS_MAX {
+            return Some("more than 20 % of the autopilot's frames are lost".into());
+        }
+        link.station_trouble()
+    }
+
+    fn report(&self, now: Stamp, link: &Link) {
+        let flaw = self.link_flaw(now, link);
+        match (self.link_problem.as_ref().or(flaw.as_ref()), self.autopilot.missing()) {
+            // While nobody else is found, the one that won't be flown is what people must know.
+            (Some(_), unfit) if !self.autopilot.found() && unfit.contains("not a multicopter") => {
+                self.context.health.degraded(unfit);
+            }
             (Some(problem), _) => self.context.health.degraded(problem.clone()),
             (None, "") => {
                 let (activity, detail) = (word(self.executor.activity()), self.executor.detail());

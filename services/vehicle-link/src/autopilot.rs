@@ -1,7 +1,7 @@
 //! One autopilot on a link: finds it, asks for its streams, keeps its telemetry and the commands under way. Synchronous: messages
 //! in, messages to send out.
 
-use halcyon_model::{FleetOrigin, Stamp, VehicleState};
+use halcyon_model::{FleetOrigin, FlightMode, LinkQuality, Stamp, VehicleState};
 use mavlink::dialects::ardupilotmega::{MavAutopilot, MavMessage};
 use mavlink::{MavHeader, Message as _};
 
@@ -9,14 +9,19 @@ use crate::config::Config;
 use crate::core::commands::{Command, CommandError, Commands, Effect, Ticket};
 use crate::core::encode::{self, Address, Datum};
 use crate::core::guidance::Setpoint;
+use crate::core::identity::{self, Identity};
 use crate::core::local::LocalFinder;
+use crate::core::loss::Loss;
+use crate::core::mode::Family;
+use crate::core::px4::{self, Offboard};
 use crate::core::streams::Streams;
 use crate::core::telemetry::Telemetry;
 use crate::core::text::Texts;
+use crate::core::timesync::TimeSync;
 use crate::core::transfers::{Request, TransferError, Transfers};
 
 /// MAV_COMP_ID_ONBOARD_COMPUTER.
-const OWN_COMPONENT: u8 = 191;
+pub(crate) const OWN_COMPONENT: u8 = 191;
 /// MAV_COMP_ID_AUTOPILOT1.
 const AUTOPILOT_COMPONENT: u8 = 1;
 /// Our system id before the vehicle's is known: not a ground station's (255), not a likely vehicle's.
@@ -33,6 +38,8 @@ pub struct Heard {
     pub found: Option<u8>,
     /// A transfer may have something to answer: [`Autopilot::poll_transfers`].
     pub transfer: bool,
+    /// To be answered with this.
+    pub reply: Option<MavMessage>,
 }
 
 /// The autopilot of one vehicle.
@@ -47,6 +54,13 @@ pub struct Autopilot {
     texts: Texts,
     commands: Commands,
     transfers: Transfers,
+    identity: Identity,
+    offboard: Offboard,
+    sync: TimeSync,
+    loss: Loss,
+    is_signed: bool,
+    /// Who was heard, and won't be flown.
+    unfit: Option<String>,
     started: Stamp,
 }
 
@@ -68,6 +82,12 @@ impl Autopilot {
             texts: Texts::default(),
             commands: Commands::default(),
             transfers: Transfers::default(),
+            identity: Identity::default(),
+            offboard: Offboard::default(),
+            sync: TimeSync::default(),
+            loss: Loss::default(),
+            is_signed: !config.signing.key_file.as_os_str().is_empty(),
+            unfit: None,
             started: now,
         })
     }
@@ -84,21 +104,47 @@ impl Autopilot {
             && data.autopilot != MavAutopilot::MAV_AUTOPILOT_INVALID
             && self.wanted.is_none_or(|wanted| wanted == system)
         {
-            self.address = Address::new(system, AUTOPILOT_COMPONENT);
-            heard.found = self.address.map(Address::system);
+            self.unfit = identity::unfit(data).map(|why| format!("MAVLink system {system}: {why}"));
+            if self.unfit.is_none() {
+                self.address = Address::new(system, AUTOPILOT_COMPONENT);
+                heard.found = self.address.map(Address::system);
+            }
         }
-        if self.address.is_none_or(|address| address.system() != system) {
-            return heard;
-        }
+        let Some(address) = self.address.filter(|address| address.system() == system) else { return heard };
+        self.count(header, now);
+        self.identity.observe(message);
+        self.telemetry.set_boot_offset_ns(self.sync.offset_ns(now));
         self.streams.observe(message.message_id(), now);
         self.local.observe(message, &self.datum, now);
         heard.transfer = self.transfers.observe(message, (system, OWN_COMPONENT), now);
         match message {
             MavMessage::STATUSTEXT(data) => heard.text = self.texts.observe(data, now).map(|text| text.text.clone()),
+            MavMessage::TIMESYNC(data) => heard.reply = self.sync.observe(data, address, now),
             MavMessage::COMMAND_ACK(data) => self.commands.observe_ack(data, system, OWN_COMPONENT, now),
             other => heard.state = self.telemetry.observe(other, now),
         }
         heard
+    }
+
+    /// A frame of a message that is not known: it counts as received.
+    pub fn observe_unread(&mut self, header: MavHeader, now: Stamp) {
+        let from_it = |address: Address| u32::from(address.system()) == header.system_id;
+        if header.component_id == AUTOPILOT_COMPONENT && self.address.is_some_and(from_it) {
+            self.count(header, now);
+        }
+    }
+
+    fn count(&mut self, header: MavHeader, now: Stamp) {
+        let missing = self.loss.observe(header.sequence, now);
+        if missing > 0 {
+            metrics::counter!("vehicle_link_frames_lost_total").increment(missing.into());
+        }
+    }
+
+    /// Share of the autopilot's frames lost lately, 0 to 1.
+    #[must_use]
+    pub fn loss(&self) -> f64 {
+        self.loss.share()
     }
 
     /// Whether the autopilot has been heard.
@@ -110,13 +156,24 @@ impl Autopilot {
     /// The state, if it is complete, and when its mode was heard.
     #[must_use]
     pub fn state(&self, now: Stamp) -> Option<(VehicleState, Stamp)> {
-        Some((self.telemetry.state(now)?, self.telemetry.heartbeat_heard()?))
+        let mut state = self.telemetry.state(now)?;
+        state.link = Some(LinkQuality {
+            loss: self.loss.share(),
+            round_trip_s: self.sync.round_trip_s(now),
+            received: self.loss.received(),
+            is_signed: self.is_signed,
+        });
+        state.firmware = self.identity.firmware().cloned();
+        Some((state, self.telemetry.heartbeat_heard()?))
     }
 
     /// What is missing for a state.
     #[must_use]
-    pub fn missing(&self) -> &'static str {
-        self.telemetry.missing()
+    pub fn missing(&self) -> &str {
+        match &self.unfit {
+            Some(unfit) if self.address.is_none() => unfit,
+            _ => self.telemetry.missing(),
+        }
     }
 
     /// Puts a command in line. Never before the autopilot is heard: what waited for it would be carried out when whoever asked has
@@ -128,12 +185,23 @@ impl Autopilot {
         if self.address.is_none() {
             return Err(CommandError::NotHeard);
         }
+        if let Command::SetMode(mode) = command {
+            let family = self.identity.family();
+            if family.set_mode_parameters(mode).is_none() {
+                return Err(CommandError::Refused { result: "unsupported", words: Some("it has no such mode".into()) });
+            }
+            if family == Family::Px4 && mode == FlightMode::Guided {
+                return self.offboard.want(ticket);
+            }
+        }
         self.commands.submit(ticket, command)
     }
 
     /// Stops asking for anything that moves the vehicle.
     pub fn withdraw(&mut self) -> Vec<Effect> {
-        self.commands.withdraw(self.address, self.telemetry.mode())
+        let mut ended = self.offboard.end(&CommandError::Withdrawn);
+        ended.extend(self.commands.withdraw(self.address, self.telemetry.mode()));
+        ended
     }
 
     /// The connection was lost: whoever answers next may be another program, or the autopilot after a restart.
@@ -141,7 +209,12 @@ impl Autopilot {
         self.address = None;
         self.local = LocalFinder::default();
         self.streams = Streams::default();
-        let mut ended = self.commands.abandon();
+        self.identity = Identity::default();
+        self.sync = TimeSync::default();
+        self.loss = Loss::default();
+        self.unfit = None;
+        let mut ended = self.offboard.end(&CommandError::LinkLost);
+        ended.extend(self.commands.abandon());
         ended.extend(self.transfers.abandon());
         ended
     }
@@ -177,18 +250,54 @@ impl Autopilot {
     pub fn started_again(&mut self) {
         self.local = LocalFinder::default();
         self.streams = Streams::default();
+        self.sync = TimeSync::default();
     }
 
     /// What is due: commands to send or to end, streams to ask for.
     pub fn poll(&mut self, now: Stamp) -> Vec<Effect> {
         let Some(address) = self.address else { return Vec::new() };
-        for stream in self.streams.due(now) {
+        let family = self.identity.family();
+        for stream in self.streams.due(now).into_iter().filter(|stream| stream.suits(family)) {
             // A full line is tried again with the next retry of the stream.
             let _ = self.commands.submit(0, Command::SetInterval(stream));
         }
-        let mut effects = self.commands.poll(address, &self.texts, now);
+        let (streams, due) = self.offboard.step(self.telemetry.mode(), now);
+        let mut effects = Vec::new();
+        for ticket in due {
+            let command = Command::SetMode(FlightMode::Guided);
+            if let Err(error) = self.commands.submit(ticket, command) {
+                effects.push(Effect::Done(ticket, command, Err(error)));
+            }
+        }
+        effects.extend(self.commands.poll(address, &self.texts, now));
+        if family == Family::Px4 {
+            effects = effects.into_iter().filter_map(|effect| self.fitted(effect)).collect();
+        }
+        if streams {
+            effects.extend(self.hold(now).map(Effect::Send));
+        }
         effects.extend(self.transfers.poll(address, now));
+        effects.extend(self.sync.ask(address, now).map(Effect::Send));
+        effects.extend(self.identity.ask(address, now).map(Effect::Send));
         effects
+    }
+
+    fn fitted(&self, effect: Effect) -> Option<Effect> {
+        match effect {
+            Effect::Send(message) => px4::fitted(message, self.telemetry.home_amsl_m()).map(Effect::Send),
+            other @ (Effect::Done(..) | Effect::Transferred(..)) => Some(other),
+        }
+    }
+
+    /// A setpoint where the vehicle is.
+    fn hold(&self, now: Stamp) -> Option<MavMessage> {
+        let place = Setpoint {
+            position_ned_m: self.telemetry.state(now)?.position_ned_m,
+            velocity_ned_mps: nalgebra::Vector3::zeros(),
+            acceleration_ned_mps2: None,
+            heading_rad: None,
+        };
+        self.setpoint(&place, now)
     }
 
     /// A setpoint for the autopilot; `None` before it was heard, or if a number is not finite.
@@ -240,5 +349,61 @@ mod tests {
         assert_eq!(autopilot.submit(3, Command::Disarm { force: true }), Err(CommandError::NotHeard));
         autopilot.observe(header, &message, t(9.0));
         assert_eq!(terminations(&autopilot.poll(t(9.0))), 0, "the motors would stop nine seconds after the refusal");
+    }
+
+    /// What the autopilot says takes 80 ms to come, always: only TIMESYNC can tell.
+    #[test]
+    fn positions_are_dated_by_timesync() {
+        let origin = FleetOrigin(halcyon_model::Geodetic::from_deg(53.1, -2.9, 0.0));
+        let mut autopilot = Autopilot::new(&Config::default(), origin, t(0.0)).unwrap();
+        let (mut header, beat) = heartbeat();
+        autopilot.observe(header, &beat, t(0.0));
+        autopilot.observe(header, &MavMessage::ATTITUDE(ardu::ATTITUDE_DATA::default()), t(0.0));
+        for step in 1..50 {
+            header.sequence += 1;
+            let now_s = f64::from(step) * 0.1;
+            let questions = autopilot.poll(t(now_s)).into_iter().filter_map(|effect| match effect {
+                Effect::Send(MavMessage::TIMESYNC(question)) => Some(question),
+                _ => None,
+            });
+            let questions: Vec<_> = questions.collect();
+            let boot_ms = 100_000 + step as u32 * 100;
+            let position = ardu::GLOBAL_POSITION_INT_DATA {
+                time_boot_ms: boot_ms,
+                lat: 531_000_000,
+                lon: -29_000_000,
+                ..Default::default()
+            };
+            autopilot.observe(header, &MavMessage::GLOBAL_POSITION_INT(position), t(now_s + 0.08));
+            let (state, _) = autopilot.state(t(now_s + 0.08)).unwrap();
+            let error_s = state.stamp.seconds_since(t(now_s));
+            if step == 1 {
+                assert!((error_s - 0.08).abs() < 1e-3, "before the answer: {error_s}");
+            } else if step > 3 {
+                assert!(error_s.abs() < 1e-3, "{step}: {error_s}");
+                assert!((state.link.unwrap().round_trip_s.unwrap() - 0.16).abs() < 1e-3);
+            }
+            for question in questions {
+                // There in 80 ms, back in 80 ms; booted at t(-100).
+                let answer = ardu::TIMESYNC_DATA { tc1: ((100.0 + now_s + 0.08) * 1e9) as i64, ..question };
+                autopilot.observe(header, &MavMessage::TIMESYNC(answer), t(now_s + 0.16));
+            }
+        }
+    }
+
+    #[test]
+    fn another_vehicle_or_another_component_is_not_heard() {
+        let origin = FleetOrigin(halcyon_model::Geodetic::from_deg(53.1, -2.9, 0.0));
+        let mut autopilot = Autopilot::new(&Config::default(), origin, t(0.0)).unwrap();
+        let (header, beat) = heartbeat();
+        let zero = MavHeader { system_id: 0, ..header };
+        assert_eq!(autopilot.observe(zero, &beat, t(0.0)).found, None, "system 0 is everybody");
+        let gimbal = MavHeader { component_id: 154, ..header };
+        assert_eq!(autopilot.observe(gimbal, &beat, t(0.0)).found, None);
+        assert_eq!(autopilot.observe(header, &beat, t(0.0)).found, Some(7));
+        let other = MavHeader { system_id: 8, sequence: 99, ..header };
+        assert_eq!(autopilot.observe(other, &beat, t(0.1)).found, None);
+        assert!(!autopilot.observe(other, &beat, t(0.1)).state);
+        assert!(autopilot.loss() < 1e-9, "the other one's numbers are not its own");
     }
 }

@@ -1,5 +1,7 @@
 //! `[vehicle_link]`
 
+use std::path::PathBuf;
+
 use halcyon_chassis::Section;
 use halcyon_model::{Role, VehicleId};
 use serde::{Deserialize, Serialize};
@@ -7,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::core::guidance::Guidance;
 use crate::core::limits::{FailSafeLimits, Limits};
 use crate::core::payload::Payload;
+use crate::endpoint::Endpoint;
 
 /// One vehicle and the link to its autopilot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -21,6 +24,12 @@ pub struct Config {
     pub endpoint: String,
     /// MAVLink system id of the autopilot; 0 takes the first autopilot heard on the link. Never used as an address.
     pub system_id: u8,
+    /// Ground stations that see the vehicle through this link, and can fly it: `udpout:192.0.2.10:14550` sends to one,
+    /// `udpin:0.0.0.0:14550` and `tcpin:0.0.0.0:5790` wait for up to eight, `tcpout:host:port` calls one. Whoever reaches a waiting port
+    /// can command the vehicle: bind it to 127.0.0.1, to a network that you trust, or sign. Empty: none.
+    pub relay: Vec<String>,
+    /// Message signing.
+    pub signing: Signing,
     /// Height of home, where the vehicle takes off, above mean water, metres.
     pub home_height_m: f64,
     /// Rate at which the vehicle's state is published, hertz.
@@ -37,6 +46,17 @@ pub struct Config {
     pub payload: Payload,
 }
 
+/// MAVLink 2's message signing between this link and its autopilot.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Signing {
+    /// File with the key: 32 bytes, or 64 hexadecimal digits, or a passphrase whose SHA-256 is the key, as in MAVProxy and Mission
+    /// Planner. With it, all that goes out is signed, and what comes in unsigned or signed otherwise is dropped. Empty: no signing.
+    pub key_file: PathBuf,
+    /// Tells this link from others of the same vehicle that use the same key.
+    pub link_id: u8,
+}
+
 impl Default for Config {
     fn default() -> Self {
         Self {
@@ -44,6 +64,8 @@ impl Default for Config {
             role: "leader".into(),
             endpoint: "tcpout:127.0.0.1:5760".into(),
             system_id: 0,
+            relay: Vec::new(),
+            signing: Signing::default(),
             home_height_m: 0.0,
             state_rate_hz: 10.0,
             guidance_rate_hz: 10.0,
@@ -75,7 +97,12 @@ impl Section for Config {
     fn validate(&self) -> Result<(), String> {
         VehicleId::new(&self.vehicle).map_err(|error| format!("vehicle: {error}"))?;
         self.role()?;
-        check_endpoint(&self.endpoint)?;
+        self.endpoint.parse::<Endpoint>()?;
+        for place in &self.relay {
+            if let Endpoint::Serial { .. } = place.parse().map_err(|problem| format!("relay: {problem}"))? {
+                return Err(format!("relay: a ground station is reached over UDP or TCP, not {place:?}"));
+            }
+        }
         if !(-10.0..=1000.0).contains(&self.home_height_m) {
             return Err(format!("home_height_m must be in -10 to 1000, not {}", self.home_height_m));
         }
@@ -98,22 +125,6 @@ impl Section for Config {
     }
 }
 
-fn check_endpoint(endpoint: &str) -> Result<(), String> {
-    let problem = || {
-        Err(format!("endpoint must be tcpout:, tcpin:, udpin: or udpout:host:port, or serial:device:baud, not {endpoint:?}"))
-    };
-    let Some((scheme, rest)) = endpoint.split_once(':') else { return problem() };
-    let Some((place, number)) = rest.rsplit_once(':') else { return problem() };
-    let ok = !place.is_empty()
-        && match scheme {
-            "tcpout" | "udpout" => number.parse::<u16>().is_ok_and(|port| port != 0),
-            "tcpin" | "udpin" => number.parse::<u16>().is_ok(),
-            "serial" => number.parse::<u32>().is_ok_and(|baud| baud > 0),
-            _ => false,
-        };
-    if ok { Ok(()) } else { problem() }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -132,6 +143,11 @@ mod tests {
         for good in ["tcpout:[::1]:5760", "udpin:0.0.0.0:14550", "serial:/dev/ttyACM0:57600", "tcpin:127.0.0.1:0"] {
             assert_eq!(Config { endpoint: good.into(), ..Config::default() }.validate(), Ok(()), "{good}");
         }
+        check(
+            Config { relay: vec!["udpin:0.0.0.0:14550".into(), "nowhere".into()], ..Config::default() },
+            "relay: endpoint must be",
+        );
+        check(Config { relay: vec!["serial:/dev/ttyUSB0:57600".into()], ..Config::default() }, "over UDP or TCP");
         check(Config { role: "boss".into(), ..Config::default() }, "role must be");
         check(Config { vehicle: "a/b".into(), ..Config::default() }, "vehicle:");
         check(Config { state_rate_hz: f64::NAN, ..Config::default() }, "state_rate_hz");

@@ -7,16 +7,20 @@
 //! | module | is |
 //! |---|---|
 //! | [`core::telemetry`] | MAVLink messages → vehicle state |
+//! | [`core::frame`], [`core::signing`], [`core::version`] | MAVLink frames as bytes, their signatures, MAVLink 1 and 2 |
+//! | [`core::timesync`], [`core::loss`] | the autopilot's clock and the round trip; which share of its frames is lost |
+//! | [`core::identity`], [`core::mode`], [`core::px4`] | what flies the vehicle; ArduCopter's and PX4's modes; what PX4 wants otherwise |
 //! | [`core::commands`] | the command protocol: retries, acknowledgements, typed refusals |
 //! | [`core::transfers`], [`core::parameters`], [`core::items`] | parameters; missions, fences, rally points |
 //! | [`core::payload`] | what holds the payload |
 //! | [`core::guidance`], [`core::separation`], [`core::track`] | the slot, the way there, the distance to everyone |
 //! | [`core::law`], [`core::observer`], [`core::inverse`] | the named laws, the leader's motion, the follower's own lag |
+//! | [`core::intent`], [`core::continuity`] | the leader's own setpoint; places without their receivers' leaps |
 //! | [`core::local`] | the autopilot's local frame, the only one in which it takes accelerations |
-//! | `experiment` | the thesis's formation flights against the simulator; behind a feature of that name |
+//! | `experiment` | the thesis's formation flights against the simulator, and many vehicles through bad radio; behind a feature of that name |
 //! | [`core::interlock`], [`core::failsafe`], [`core::control`] | when not to; the table of fail-safes; the pilot |
 //! | [`core::executor`] | reality made to match the newest plan or a direct command |
-//! | [`io::link`] | sockets and serial ports that come back |
+//! | [`io::link`] | sockets and serial ports that come back, and ground stations beside them |
 //! | [`actor`] | the one task |
 //!
 //! **Invariant:** nothing under `core/` knows the bus, a socket or a clock; messages and states go in, setpoints, requests and
@@ -28,6 +32,7 @@ pub mod actor;
 pub mod autopilot;
 pub mod config;
 pub mod core;
+pub mod endpoint;
 #[cfg(any(test, feature = "experiment"))]
 pub mod experiment;
 pub mod io;

@@ -26,10 +26,18 @@ struct Rig {
 
 impl Rig {
     async fn start(peer: Peer, scheme: &str) -> Self {
+        Self::with(peer, scheme, Config::default()).await
+    }
+
+    async fn with(peer: Peer, scheme: &str, config: Config) -> Self {
+        let endpoint = format!("{scheme}:{}", peer.address);
+        Self::at(peer, Config { endpoint, ..config }).await
+    }
+
+    async fn at(peer: Peer, config: Config) -> Self {
         let context = testing::context("vehicle-link.test").await;
         let states = context.bus.subscribe(&topics::vehicle_states()).await.unwrap();
-        let endpoint = format!("{scheme}:{}", peer.address);
-        let config = Config { vehicle: "v".into(), role: "follower".into(), endpoint, ..Config::default() };
+        let config = Config { vehicle: "v".into(), role: "follower".into(), ..config };
         let service = tokio::spawn(run(context.clone(), config));
         Self { context, peer, states, service }
     }
@@ -93,6 +101,92 @@ async fn finds_it_and_publishes(peer: Peer, scheme: &str) {
             assert_eq!(target, SYSTEM, "{message:?}");
         }
     }
+    rig.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_clock_the_round_trip_the_firmware_and_the_loss_are_told() {
+    let mut rig = Rig::start(Peer::udp(), "udpout").await;
+    let told = |state: &VehicleState| {
+        state.link.is_some_and(|link| link.round_trip_s.is_some())
+            && state.firmware.as_ref().is_some_and(|f| !f.version.is_empty())
+    };
+    let state = rig.state(told).await;
+    let link = state.link.unwrap();
+    assert!(link.round_trip_s.unwrap() < 1.0 && link.received > 0 && !link.is_signed, "{link:?}");
+    assert!(link.loss < 1e-9, "{link:?}");
+    let firmware = state.firmware.unwrap();
+    assert_eq!((&*firmware.autopilot, &*firmware.vehicle, &*firmware.version), ("ArduPilot", "quadrotor", "4.6.0"));
+    rig.peer.shared.lose_one_of.store(4, Ordering::Relaxed);
+    let lossy = rig.state(|state| state.link.is_some_and(|link| link.loss > 0.15)).await;
+    assert!(lossy.link.unwrap().loss < 0.3);
+    rig.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_autopilot_that_knows_only_mavlink_1_is_spoken_to_in_it() {
+    let peer = Peer::tcp();
+    peer.shared.is_old.store(true, Ordering::Relaxed);
+    let mut rig = Rig::start(peer, "tcpout").await;
+    rig.state(|_| true).await;
+    // It reads nothing else.
+    rig.wait(|peer| peer.sent(asks_for_streams) >= 5).await;
+    let reply = rig.call(VehicleAction::SetMode(FlightMode::Guided)).await;
+    assert!(reply.accepted, "{reply:?}");
+    rig.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn px4s_modes_are_set_and_heard_by_its_own_numbers() {
+    let peer = Peer::tcp();
+    let px4 = mavlink::dialects::ardupilotmega::MavAutopilot::MAV_AUTOPILOT_PX4;
+    peer.shared.firmware.lock().unwrap().0 = px4;
+    peer.set_mode(0x0003_0000);
+    let mut rig = Rig::start(peer, "tcpout").await;
+    let state = rig.state(|state| state.mode == FlightMode::PosHold).await;
+    assert_eq!(state.firmware.unwrap().autopilot, "PX4");
+    let reply = rig.call(VehicleAction::SetMode(FlightMode::Guided)).await;
+    assert!(reply.accepted, "{reply:?}");
+    rig.state(|state| state.mode == FlightMode::Guided).await;
+    assert_eq!(rig.peer.mode(), 0x0006_0000, "OFFBOARD");
+    // Setpoints came first, or it would have refused.
+    let frames = rig.peer.shared.frames.lock().unwrap().clone();
+    let is_mode =
+        |message: &MavMessage| matches!(message, MavMessage::COMMAND_LONG(data) if data.command == MavCmd::MAV_CMD_DO_SET_MODE);
+    let asked = frames.iter().position(|(_, message)| is_mode(message)).unwrap();
+    let is_setpoint = |(_, message): &&(_, MavMessage)| matches!(message, MavMessage::SET_POSITION_TARGET_GLOBAL_INT(_));
+    assert!(frames[..asked].iter().filter(is_setpoint).count() >= 5);
+    rig.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_is_no_multicopter_is_not_touched() {
+    let peer = Peer::tcp();
+    peer.shared.firmware.lock().unwrap().1 = mavlink::dialects::ardupilotmega::MavType::MAV_TYPE_FIXED_WING;
+    let mut rig = Rig::start(peer, "tcpout").await;
+    rig.wait(|peer| peer.sent(|message| matches!(message, MavMessage::HEARTBEAT(_))) >= 3).await;
+    let reply = rig.call(VehicleAction::SetMode(FlightMode::Guided)).await;
+    assert!(!reply.accepted, "{reply:?}");
+    assert_eq!(rig.peer.sent(|message| !matches!(message, MavMessage::HEARTBEAT(_))), 0);
+    rig.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn of_two_vehicles_on_one_socket_only_the_chosen_one_is_spoken_to() {
+    let port = peer::free_udp_port();
+    let place = std::net::SocketAddr::from(([127, 0, 0, 1], port));
+    let config = Config { endpoint: format!("udpin:{place}"), system_id: 8, ..Config::default() };
+    // The other speaks first, and goes on.
+    let other = Peer::udp_to(place, 7);
+    let mut rig = Rig::at(Peer::udp_to(place, 8), config).await;
+    rig.state(|_| true).await;
+    rig.wait(|peer| peer.sent(asks_for_streams) >= 10).await;
+    let reply = rig.call(VehicleAction::SetMode(FlightMode::Guided)).await;
+    assert!(reply.accepted, "{reply:?}");
+    assert_eq!((rig.peer.mode(), other.mode()), (4, 0));
+    assert_eq!(other.sent(|message| !matches!(message, MavMessage::HEARTBEAT(_))), 0);
+    let frames = rig.peer.shared.frames.lock().unwrap().clone();
+    assert!(frames.iter().all(|(_, message)| message.target_system_id().is_none_or(|target| target == 8)));
     rig.stop().await;
 }
 

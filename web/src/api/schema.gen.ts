@@ -396,6 +396,62 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/vehicles/{id}/parameters": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** The autopilot's parameters, or one of them. All of them take seconds to a minute over a radio. */
+        get: operations["read_parameters"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/vehicles/{id}/parameters/{name}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Sets a parameter of the autopilot; the answer is what the autopilot then says. Refused (409) while the motors turn, unless
+         *     `even_in_flight`; where the value stays another; and where there is no such parameter.
+         */
+        put: operations["set_parameter"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/vehicles/{id}/{list}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** The mission, fence or rally points that the autopilot keeps. */
+        get: operations["download_items"];
+        /** Replaces the mission, fence or rally points that the autopilot keeps. A fence changes with the motors off only. */
+        put: operations["upload_items"];
+        post?: never;
+        /** Empties the mission, fence or rally points that the autopilot keeps. */
+        delete: operations["clear_items"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/healthz": {
         parameters: {
             query?: never;
@@ -451,6 +507,24 @@ export interface paths {
 export type webhooks = Record<string, never>;
 export interface components {
     schemas: {
+        /** @description Acceleration without gravity. */
+        AccelerationNed: {
+            /**
+             * Format: double
+             * @description Metres per second squared downwards.
+             */
+            down_mps2: number;
+            /**
+             * Format: double
+             * @description Metres per second squared eastwards.
+             */
+            east_mps2: number;
+            /**
+             * Format: double
+             * @description Metres per second squared northwards.
+             */
+            north_mps2: number;
+        };
         /** @description What the on-board guidance is doing, with what belongs to it. */
         Activity: {
             /** @description Which activity. */
@@ -470,6 +544,44 @@ export interface components {
          * @enum {string}
          */
         ActivityKind: "idle" | "preparing" | "taking_off" | "transit" | "holding" | "following" | "approaching" | "descending" | "landed" | "returning" | "fail_safe" | "pilot_control";
+        /** @description Seconds since each part of the state was heard when it was sent; `null` if never. */
+        Ages: {
+            /**
+             * Format: double
+             * @description Attitude.
+             */
+            attitude_s: number | null;
+            /**
+             * Format: double
+             * @description Battery.
+             */
+            battery_s: number | null;
+            /**
+             * Format: double
+             * @description The estimator's health.
+             */
+            estimator_s: number | null;
+            /**
+             * Format: double
+             * @description GNSS.
+             */
+            fix_s: number | null;
+            /**
+             * Format: double
+             * @description Home.
+             */
+            home_s: number | null;
+            /**
+             * Format: double
+             * @description Landed or not.
+             */
+            landed_s: number | null;
+            /**
+             * Format: double
+             * @description Flight mode.
+             */
+            mode_s: number | null;
+        };
         /**
          * @description Who may say that a follower goes.
          * @enum {string}
@@ -496,6 +608,8 @@ export interface components {
             /** @description End. */
             to: string;
         };
+        /** @description A MAVLink command, by its number or by its name with or without `MAV_CMD_`. */
+        CommandId: number | string;
         /** @description The answer to an accepted command. It is being carried out; watch `watch`, or the live stream, to see it done. */
         CommandResult: {
             /** @description Always `true`: a refused command is a problem with status 409. */
@@ -594,6 +708,15 @@ export interface components {
             /** @description Why. */
             why: string;
         };
+        /** @description What flies a vehicle. */
+        Firmware: {
+            /** @description Such as `ArduPilot`. */
+            autopilot: string;
+            /** @description Such as `quadrotor`. */
+            vehicle: string;
+            /** @description Such as `4.6.0`; empty if it does not say. */
+            version: string;
+        };
         /** @description GNSS quality. */
         Fix: {
             /**
@@ -614,6 +737,11 @@ export interface components {
          * @enum {string}
          */
         FixKind: "no_gps" | "no_fix" | "2d" | "3d" | "dgps" | "rtk_float" | "rtk_fixed" | "other";
+        /**
+         * @description What an item's altitude counts from.
+         * @enum {string}
+         */
+        Frame: "sea_level" | "home" | "terrain" | "none";
         /** @description A WGS-84 position with its altitude. */
         Global: {
             /**
@@ -663,6 +791,44 @@ export interface components {
             /** @description Version of the program. */
             version: string;
         };
+        /** @description One item of a mission, a fence or rally points. A number that is `null` is left to the autopilot. */
+        Item: {
+            /**
+             * Format: double
+             * @description Altitude, metres.
+             */
+            altitude_m?: number | null;
+            /** @description Go on to the next item by itself. */
+            autocontinue?: boolean;
+            /** @description What: name or number; answers give the name where there is one. */
+            command: components["schemas"]["CommandId"];
+            /** @description What the altitude counts from. */
+            frame: components["schemas"]["Frame"];
+            /**
+             * Format: double
+             * @description Latitude, degrees, positive north.
+             */
+            latitude_deg?: number | null;
+            /**
+             * Format: double
+             * @description Longitude, degrees, positive east.
+             */
+            longitude_deg?: number | null;
+            /** @description The command's parameters 1 to 4. */
+            parameters?: (number | null)[];
+        };
+        /** @description A list of items that an autopilot keeps. ArduPilot's item 0, which is home, is not among them. */
+        ItemList: {
+            /** @description The items, in order. */
+            items: components["schemas"]["Item"][];
+            /** @description Which list. */
+            kind: components["schemas"]["ListKind"];
+        };
+        /** @description The items to put in place of those that are there. None clears the list. */
+        ItemUpload: {
+            /** @description At most 700, in order. */
+            items: components["schemas"]["Item"][];
+        };
         /**
          * @description Where the autopilot believes that the vehicle is.
          * @enum {string}
@@ -679,6 +845,31 @@ export interface components {
             /** @description The verdict it rests on. */
             verdict: components["schemas"]["VerdictState"];
         };
+        /** @description The link between a vehicle's computer and its autopilot. */
+        LinkQuality: {
+            /**
+             * Format: double
+             * @description Share of the autopilot's messages lost lately, percent.
+             */
+            loss_percent: number;
+            /**
+             * Format: int64
+             * @description Messages since the link was opened.
+             */
+            received: number;
+            /**
+             * Format: double
+             * @description There and back, milliseconds; `null` if not measured.
+             */
+            round_trip_ms: number | null;
+            /** @description They are signed with the fleet's key. */
+            signed: boolean;
+        };
+        /**
+         * @description Which list of items.
+         * @enum {string}
+         */
+        ListKind: "mission" | "fence" | "rally";
         /** @description A position in the fleet's local frame. */
         LocalPosition: {
             /**
@@ -949,6 +1140,7 @@ export interface components {
         Page_Vehicle: {
             /** @description The items, in the list's order. */
             items: {
+                acceleration: components["schemas"]["AccelerationNed"] | null;
                 /** @description What the guidance is doing. */
                 activity: components["schemas"]["Activity"];
                 /**
@@ -956,6 +1148,8 @@ export interface components {
                  * @description Seconds since then when this was sent.
                  */
                 age_s: number;
+                /** @description How old each part of this is. */
+                ages: components["schemas"]["Ages"];
                 /** @description Motors armed. */
                 armed: boolean;
                 /**
@@ -975,6 +1169,7 @@ export interface components {
                 boot_s: number;
                 /** @description The estimator's position is good enough to fly by. */
                 estimator_ok: boolean;
+                firmware: components["schemas"]["Firmware"] | null;
                 fix: components["schemas"]["Fix"] | null;
                 /**
                  * Format: double
@@ -986,6 +1181,7 @@ export interface components {
                 id: string;
                 /** @description On the ground or in the air. */
                 landed: components["schemas"]["LandedState"];
+                link: components["schemas"]["LinkQuality"] | null;
                 /** @description Position in the fleet's local frame. */
                 local: components["schemas"]["LocalPosition"];
                 /** @description Flight mode in ArduCopter's words, such as `GUIDED`; `MODE_` and its number where it has no name here. */
@@ -1002,6 +1198,11 @@ export interface components {
                 plan_generation: number;
                 /** @description Global position. */
                 position: components["schemas"]["Global"];
+                /**
+                 * Format: double
+                 * @description Downward rangefinder, metres along the body's down axis; `null` without one, or out of its range.
+                 */
+                range_m: number | null;
                 /** @description The autopilot would let it arm. */
                 ready_to_arm: boolean;
                 /** @description What it is for. */
@@ -1022,6 +1223,28 @@ export interface components {
             /** @description Give this as `after` to get the next page; `null` on the last one. */
             next: string | null;
         };
+        /** @description One parameter of an autopilot. */
+        Parameter: {
+            /** @description Its name in the autopilot's words, such as `WPNAV_SPEED`. */
+            name: string;
+            /** @description What it holds. */
+            type: components["schemas"]["ParameterType"];
+            /**
+             * Format: double
+             * @description Its value, in the autopilot's unit.
+             */
+            value: number;
+        };
+        /** @description Parameters of an autopilot, in its own order. */
+        ParameterList: {
+            /** @description The parameters. */
+            parameters: components["schemas"]["Parameter"][];
+        };
+        /**
+         * @description What a parameter holds.
+         * @enum {string}
+         */
+        ParameterType: "uint8" | "int8" | "uint16" | "int16" | "uint32" | "int32" | "real32";
         /** @description Who goes where, valid until when. */
         Plan: {
             /**
@@ -1329,6 +1552,16 @@ export interface components {
             /** @description Version of the program. */
             version: string;
         };
+        /** @description A new value for a parameter. */
+        SetParameter: {
+            /** @description Also while the motors turn. Some parameters are dangerous in flight. */
+            even_in_flight?: boolean;
+            /**
+             * Format: double
+             * @description In the autopilot's unit.
+             */
+            value: number;
+        };
         /**
          * @description How much an event matters.
          * @enum {string}
@@ -1521,6 +1754,7 @@ export interface components {
         };
         /** @description A vehicle, as it last said. */
         Vehicle: {
+            acceleration: components["schemas"]["AccelerationNed"] | null;
             /** @description What the guidance is doing. */
             activity: components["schemas"]["Activity"];
             /**
@@ -1528,6 +1762,8 @@ export interface components {
              * @description Seconds since then when this was sent.
              */
             age_s: number;
+            /** @description How old each part of this is. */
+            ages: components["schemas"]["Ages"];
             /** @description Motors armed. */
             armed: boolean;
             /**
@@ -1547,6 +1783,7 @@ export interface components {
             boot_s: number;
             /** @description The estimator's position is good enough to fly by. */
             estimator_ok: boolean;
+            firmware: components["schemas"]["Firmware"] | null;
             fix: components["schemas"]["Fix"] | null;
             /**
              * Format: double
@@ -1558,6 +1795,7 @@ export interface components {
             id: string;
             /** @description On the ground or in the air. */
             landed: components["schemas"]["LandedState"];
+            link: components["schemas"]["LinkQuality"] | null;
             /** @description Position in the fleet's local frame. */
             local: components["schemas"]["LocalPosition"];
             /** @description Flight mode in ArduCopter's words, such as `GUIDED`; `MODE_` and its number where it has no name here. */
@@ -1574,6 +1812,11 @@ export interface components {
             plan_generation: number;
             /** @description Global position. */
             position: components["schemas"]["Global"];
+            /**
+             * Format: double
+             * @description Downward rangefinder, metres along the body's down axis; `null` without one, or out of its range.
+             */
+            range_m: number | null;
             /** @description The autopilot would let it arm. */
             ready_to_arm: boolean;
             /** @description What it is for. */
@@ -1663,6 +1906,15 @@ export interface components {
         } | {
             /** @enum {string} */
             action: "terminate";
+        } | {
+            /** @enum {string} */
+            action: "release_payload";
+        } | {
+            /** @enum {string} */
+            action: "secure_payload";
+        } | {
+            /** @enum {string} */
+            action: "cancel_transfer";
         };
         /** @description Velocity over ground. */
         VelocityNed: {
@@ -2530,6 +2782,180 @@ export interface operations {
                 headers: {
                     /** @description The vehicle */
                     Location?: string;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CommandResult"];
+                };
+            };
+            /** @description A problem */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    read_parameters: {
+        parameters: {
+            query?: {
+                /** @description This one alone. */
+                name?: string;
+            };
+            header?: never;
+            path: {
+                id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ParameterList"];
+                };
+            };
+            /** @description A problem */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    set_parameter: {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description Who commands this, for the record. */
+                "Halcyon-Operator"?: string;
+            };
+            path: {
+                id: string;
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["SetParameter"];
+            };
+        };
+        responses: {
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Parameter"];
+                };
+            };
+            /** @description A problem */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    download_items: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                id: string;
+                list: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ItemList"];
+                };
+            };
+            /** @description A problem */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    upload_items: {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description Who commands this, for the record. */
+                "Halcyon-Operator"?: string;
+            };
+            path: {
+                id: string;
+                list: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ItemUpload"];
+            };
+        };
+        responses: {
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CommandResult"];
+                };
+            };
+            /** @description A problem */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    clear_items: {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description Who commands this, for the record. */
+                "Halcyon-Operator"?: string;
+            };
+            path: {
+                id: string;
+                list: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            200: {
+                headers: {
                     [name: string]: unknown;
                 };
                 content: {

@@ -223,8 +223,12 @@ impl Autopilot {
     }
 
     fn home_by_command(&mut self, here: f32, place: &Place) -> mav::MavResult {
+        let here_m = Some(self.sensed.estimate.position_ned_m).filter(|_| self.sensed.estimate.position_ok);
         let home_m = match *place {
-            _ if here == 1.0 => Some(self.sensed.estimate.position_ned_m).filter(|_| self.sensed.estimate.position_ok),
+            // No place means here too.
+            Place::Int { x: 0, y: 0, .. } => here_m,
+            Place::Long([latitude_deg, longitude_deg, _]) if latitude_deg == 0.0 && longitude_deg == 0.0 => here_m,
+            _ if here == 1.0 => here_m,
             Place::Int { frame, x, y, z } => self.place(frame, x, y, f64::from(z)),
             Place::Long([latitude_deg, longitude_deg, z]) => {
                 let tenths = |degrees: f32| (f64::from(degrees) * 1e7) as i32;

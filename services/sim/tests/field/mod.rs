@@ -155,7 +155,7 @@ impl Field {
     }
 
     pub(crate) fn arm_when_ready(&mut self) -> MavResult {
-        assert!(self.vehicle.truth().stamp.as_nanos() < 1_760_000_060_000_000_000, "never ready: {:?}", self.texts());
+        assert!(self.vehicle.truth().stamp.as_nanos() < 1_760_000_600_000_000_000, "never ready: {:?}", self.texts());
         self.set_mode(Mode::Guided);
         self.arm()
     }

@@ -352,6 +352,8 @@ impl Download {
                     self.failed = Some(TransferError::Unreadable(problem));
                 }
                 self.count = Some(data.count);
+                // Home is not asked for.
+                self.got = u16::from(self.home).min(data.count);
                 self.retry = Retry::default();
             }
             MavMessage::MISSION_ITEM_INT(data) if data.mission_type == ours => self.take(data),
@@ -369,11 +371,9 @@ impl Download {
         if self.count.is_none_or(|count| data.seq >= count) || data.seq != self.got {
             return;
         }
-        if !(self.home && data.seq == 0) {
-            match item(data) {
-                Ok(item) => self.items.push(item),
-                Err(error) => self.failed = Some(error),
-            }
+        match item(data) {
+            Ok(item) => self.items.push(item),
+            Err(error) => self.failed = Some(error),
         }
         self.got += 1;
         self.retry = Retry::default();

@@ -22,7 +22,8 @@ pub enum Law {
     /// Extrapolated to now by the state's age, velocity and acceleration fed forward; acceleration and yaw rate by filtered
     /// differences.
     PositionVelocityAcceleration,
-    /// Extrapolated to now; acceleration and jerk by the leader's lean, and the follower's own lag made up for.
+    /// Extrapolated to now: towards the leader's own setpoint where it says it, else with acceleration and jerk by its lean. The
+    /// follower's own lag is made up for.
     #[default]
     Halcyon,
 }

@@ -1,6 +1,7 @@
 //! The pure core: synchronous, deterministic, takes `now`, does no I/O.
 
 pub mod boot;
+pub mod budget;
 pub mod commands;
 pub mod continuity;
 pub mod control;
@@ -8,7 +9,9 @@ pub mod encode;
 pub mod energy;
 pub mod executor;
 pub mod failsafe;
+pub mod frame;
 pub mod guidance;
+pub mod identity;
 pub mod intent;
 pub mod interlock;
 pub mod inverse;
@@ -17,17 +20,23 @@ pub mod jump;
 pub mod law;
 pub mod limits;
 pub mod local;
+pub mod loss;
+pub mod mode;
 pub mod motion;
 pub mod observer;
 pub mod parameters;
 pub mod payload;
+pub mod px4;
 pub mod separation;
+pub mod signing;
 pub mod streams;
 pub mod surface;
 pub mod telemetry;
 pub mod text;
+pub mod timesync;
 pub mod track;
 pub mod transfers;
+pub mod version;
 
 #[cfg(test)]
 mod tests;

@@ -7,6 +7,9 @@
 //! Who follows gives way: a vehicle that isn't following is not pushed along by one that is, or the two would drive each other
 //! faster and faster (the follower after its slot, the leader away from the follower). Inside the least separation nobody waits
 //! for the other.
+//!
+//! Where several leave a way, the nearest velocity to the wanted one that keeps every distance is taken; where they leave none, the
+//! one that breaks them least.
 
 use nalgebra::Vector3;
 
@@ -28,6 +31,9 @@ const CHASE_HZ: f64 = 1.0;
 /// A silent vehicle may have gone anywhere: its kept distance grows by this much a second, up to [`GROWTH_M_MAX`].
 const GROWTH_MPS: f64 = 0.5;
 const GROWTH_M_MAX: f64 = 3.0;
+/// A state is carried on for so long, seconds; then the vehicle may stand there, or may fly on, for so long.
+const STOPPED_S: f64 = 1.0;
+const ONWARD_S_MAX: f64 = 5.0;
 /// A flying vehicle of which nothing has come for so long is forgotten, seconds; a parked one stays where it was.
 const FORGET_S: f64 = 30.0;
 /// Passes over all constraints; a handful of vehicles needs two or three, ten in a crowd some dozen.
@@ -75,6 +81,21 @@ pub fn obstacle(track: &Track, own_follows: bool, limits: &Limits, now: Stamp) -
         keep_m: limits.separation_m_min + limits.separation_margin_m + growth_m,
         yields_beyond_m: (it_follows && !own_follows).then_some(limits.separation_m_min),
     })
+}
+
+/// Where a vehicle is that has been silent for more than a second and has not stopped, as [`obstacle`] has it, but flies on: nobody
+/// knows which. `None` once it may be anywhere.
+#[must_use]
+pub fn onward(track: &Track, own_follows: bool, limits: &Limits, now: Stamp) -> Option<Obstacle> {
+    let silent_s = track.silent_s(now);
+    if track.parked() || !(STOPPED_S..ONWARD_S_MAX).contains(&silent_s) {
+        return None;
+    }
+    let stopped = obstacle(track, own_follows, limits, now)?;
+    let velocity_ned_mps = track.predict(now, 0.0).velocity_ned_mps;
+    let position_ned_m = stopped.position_ned_m + velocity_ned_mps * (silent_s - STOPPED_S);
+    let keep_m = limits.separation_m_min + limits.separation_margin_m;
+    Some(Obstacle { position_ned_m, velocity_ned_mps, keep_m, ..stopped })
 }
 
 /// Least opening speed (negative: greatest closing speed) at a gap to the kept distance, metres per second.
@@ -214,7 +235,10 @@ pub fn filter(
 
 #[cfg(test)]
 mod tests {
+    use halcyon_model::VehicleState;
+
     use super::*;
+    use crate::core::track::tests::{state, t};
 
     fn still(x: f64, y: f64, z: f64) -> Obstacle {
         Obstacle {
@@ -326,5 +350,20 @@ mod tests {
             .collect();
         let velocity = filter(Vector3::new(0.0, 0.0, 0.0), [own, own], own, &ring, &limits);
         assert!(velocity.norm() < 0.05, "{velocity}");
+    }
+
+    /// At 3 m/s, silent for 3 s: it may stand where its last second brought it, 3 m on, or be 9 m on.
+    #[test]
+    fn a_silent_vehicle_may_have_stopped_or_flown_on() {
+        let limits = Limits::default();
+        let moving = VehicleState { velocity_ned_mps: Vector3::new(3.0, 0.0, 0.0), ..state(t(0.0), 0.0) };
+        let track = Track::new(moving, t(0.0));
+        assert_eq!(onward(&track, false, &limits, t(0.9)), None);
+        let stopped = obstacle(&track, false, &limits, t(3.0)).unwrap();
+        let flown = onward(&track, false, &limits, t(3.0)).unwrap();
+        assert!((stopped.position_ned_m.x - 3.0).abs() < 1e-9 && stopped.velocity_ned_mps.norm() == 0.0);
+        assert!((flown.position_ned_m.x - 9.0).abs() < 1e-9 && (flown.velocity_ned_mps.x - 3.0).abs() < 1e-9);
+        assert!(flown.keep_m < stopped.keep_m);
+        assert_eq!(onward(&track, false, &limits, t(5.1)), None, "it may be anywhere");
     }
 }

@@ -6,6 +6,8 @@ use halcyon_model::Stamp;
 use mavlink::MessageData as _;
 use mavlink::dialects::ardupilotmega as ardu;
 
+use super::mode::Family;
+
 /// A wanted stream: message id, interval, and the silence after which it is asked for again.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stream {
@@ -17,12 +19,24 @@ pub struct Stream {
     pub stall_s: f64,
 }
 
+impl Stream {
+    /// Whether this firmware has it: each has its own way to say how its estimator is.
+    #[must_use]
+    pub fn suits(&self, family: Family) -> bool {
+        match self.message_id {
+            ardu::EKF_STATUS_REPORT_DATA::ID => family == Family::ArduPilot,
+            ardu::ESTIMATOR_STATUS_DATA::ID => family == Family::Px4,
+            _ => true,
+        }
+    }
+}
+
 const fn stream(message_id: u32, interval_us: u32, stall_s: f64) -> Stream {
     Stream { message_id, interval_us, stall_s }
 }
 
 /// What is asked for. Heartbeats come faster than the usual 1 Hz, since they tell that the pilot took over.
-pub const STREAMS: [Stream; 11] = [
+pub const STREAMS: [Stream; 12] = [
     stream(ardu::GLOBAL_POSITION_INT_DATA::ID, 100_000, 2.0),
     stream(ardu::ATTITUDE_QUATERNION_DATA::ID, 100_000, 2.0),
     // Where its local frame lies: setpoints with acceleration are taken only there.
@@ -31,6 +45,7 @@ pub const STREAMS: [Stream; 11] = [
     stream(ardu::EXTENDED_SYS_STATE_DATA::ID, 200_000, 3.0),
     stream(ardu::SYS_STATUS_DATA::ID, 500_000, 4.0),
     stream(ardu::EKF_STATUS_REPORT_DATA::ID, 500_000, 4.0),
+    stream(ardu::ESTIMATOR_STATUS_DATA::ID, 500_000, 4.0),
     stream(ardu::GPS_RAW_INT_DATA::ID, 500_000, 4.0),
     stream(ardu::BATTERY_STATUS_DATA::ID, 1_000_000, 8.0),
     stream(ardu::HOME_POSITION_DATA::ID, 1_000_000, 8.0),
@@ -91,6 +106,12 @@ impl Streams {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn each_firmware_is_asked_for_its_own_estimators_health() {
+        let of = |family| STREAMS.iter().filter(|stream| stream.suits(family)).count();
+        assert_eq!((of(Family::ArduPilot), of(Family::Px4)), (STREAMS.len() - 1, STREAMS.len() - 1));
+    }
 
     #[test]
     fn all_are_asked_for_once_and_only_a_stalled_one_again() {

@@ -123,7 +123,7 @@ impl Telemetry {
         match message {
             MavMessage::HEARTBEAT(data) => {
                 let armed = data.base_mode.contains(ardu::MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED);
-                self.heartbeat = Some(Aged((FlightMode::from_copter(data.custom_mode), armed), now));
+                self.heartbeat = Some(Aged((super::mode::from_heartbeat(data), armed), now));
                 return true;
             }
             MavMessage::GLOBAL_POSITION_INT(data) => {
@@ -217,6 +217,11 @@ impl Telemetry {
         false
     }
 
+    /// What TIMESYNC says of the autopilot's clock: our time at its boot, nanoseconds; `None` while it says nothing.
+    pub fn set_boot_offset_ns(&mut self, offset_ns: Option<i64>) {
+        self.boot.synced_ns = offset_ns;
+    }
+
     fn observe_sys_status(&mut self, data: &ardu::SYS_STATUS_DATA, now: Stamp) {
         let prearm = ardu::MavSysStatusSensor::MAV_SYS_STATUS_PREARM_CHECK;
         let ok = data.onboard_control_sensors_present.contains(prearm)
@@ -275,6 +280,12 @@ impl Telemetry {
     #[must_use]
     pub fn mode(&self) -> Option<FlightMode> {
         self.heartbeat.map(|heartbeat| heartbeat.0.0)
+    }
+
+    /// Altitude of home above mean sea level, metres, by the autopilot's two altitudes.
+    #[must_use]
+    pub fn home_amsl_m(&self) -> Option<f64> {
+        self.position.map(|position| position.geodetic.altitude_m - position.relative_altitude_m)
     }
 
     /// What is still missing before there is a state, for people.
@@ -371,11 +382,12 @@ fn landed(state: ardu::MavLandedState) -> LandedState {
     }
 }
 
-/// Turns the autopilot's time since boot into the fleet's time: the offset is the least seen lately, so that queueing delay
-/// doesn't date a position later than it was measured.
+/// Turns the autopilot's time since boot into the fleet's time. The offset is TIMESYNC's ([`super::timesync`]) while that is fresh, and
+/// else the least seen lately, so that queueing delay doesn't date a position later than it was measured.
 #[derive(Debug, Clone, Copy, Default)]
 struct BootClock {
     last_ms: Option<u32>,
+    synced_ns: Option<i64>,
     window: Option<(Stamp, i64, i64)>,
 }
 
@@ -395,7 +407,9 @@ impl BootClock {
         } else {
             (since, current, previous)
         });
-        let stamp = Stamp::from_nanos(i64::from(boot_ms) * 1_000_000 + best);
+        // One that is a second off the other belongs to a boot that is over, or to a counter that has wrapped.
+        let synced_ns = self.synced_ns.filter(|synced_ns| synced_ns.abs_diff(best) < 1_000_000_000);
+        let stamp = Stamp::from_nanos((i64::from(boot_ms) * 1_000_000).saturating_add(synced_ns.unwrap_or(best)));
         // However wrong that clock is: never ahead of now, never more than a second behind it.
         stamp.clamp(now.plus_secs_f64(-1.0), now)
     }
@@ -605,5 +619,16 @@ mod tests {
         }
         let stamp = clock.stamp(0, t(100.0));
         assert_eq!(stamp, t(100.0));
+    }
+
+    #[test]
+    fn a_synced_clock_dates_exactly_and_one_of_another_boot_does_not() {
+        let mut clock = BootClock { synced_ns: Some(t(0.0).as_nanos()), ..BootClock::default() };
+        // Every message 80 ms late: least delay can't know that.
+        assert_eq!(clock.stamp(10_000, t(10.08)), t(10.0));
+        assert_eq!(clock.stamp(500, t(20.08)), t(20.08), "restarted");
+        clock.synced_ns = Some(t(19.58).as_nanos());
+        assert_eq!(clock.stamp(600, t(20.2)), t(20.18));
+        assert_eq!(clock.stamp(900, t(20.3)), t(20.3), "never ahead of now");
     }
 }

@@ -25,10 +25,10 @@ fn mean(scenario: &Scenario) -> Mean {
         least_m: reports.iter().map(|report| report.least_separation_m).fold(f64::INFINITY, f64::min),
         least_mean_m: of(|report| report.least_separation_m),
     };
-    let Scenario { law, flight, slot_m, gnss, gain_scale, separation, .. } = scenario;
+    let Scenario { law, flight, slot_m, gnss, gain_scale, separation, shares_intent, .. } = scenario;
     let flight = if matches!(flight, Flight::Square { .. }) { "square" } else { "sweep" };
     println!(
-        "{law:?} | {flight} | {slot_m} m | {gnss:?} | gains × {gain_scale} | filter {separation} | \
+        "{law:?} | {flight} | {slot_m} m | {gnss:?} | gains × {gain_scale} | filter {separation} | intent {shares_intent} | \
          range {:.3} slot {:.3} least {:.2} (mean {:.2}) altitude {:.3}",
         mean.range_m, mean.slot_m, mean.least_m, mean.least_mean_m, mean.altitude_m
     );
@@ -89,4 +89,26 @@ fn the_same_scenario_gives_the_same_report_and_a_north_lock_does_not_swing() {
     let report = fly(&scenario).expect("a formation");
     assert_eq!(fly(&scenario), Ok(report));
     assert!(report.true_errors.slot_rms_m < 0.1, "{report:?}");
+}
+
+/// A leader that is flown by its own vehicle-link says what it asks of its autopilot: the issue's target, in the worst flight too.
+#[test]
+fn a_leader_that_says_what_it_asks_for_is_followed_within_the_target() {
+    let shared = |flight| Scenario { shares_intent: true, ..Scenario::new(Law::Halcyon, flight) };
+    let square = mean(&shared(Flight::SQUARE));
+    assert!(square.range_m <= 0.10 && square.slot_m <= 0.18 && square.least_m >= 4.5 && square.altitude_m <= 0.05);
+    let sweep = mean(&shared(Flight::SWEEP));
+    assert!(sweep.range_m <= 0.08 && sweep.slot_m <= 0.20 && sweep.least_m >= 4.8 && sweep.altitude_m <= 0.05);
+    for flight in [Flight::SQUARE, Flight::SWEEP] {
+        let rtk = mean(&Scenario { gnss: Gnss::Rtk, ..shared(flight) });
+        assert!(rtk.range_m <= 0.12 && rtk.altitude_m <= 0.10);
+        let thesis = mean(&Scenario { gnss: Gnss::Thesis, ..shared(flight) });
+        assert!(thesis.range_m <= 0.25 && thesis.altitude_m <= 0.25);
+    }
+    for gain_scale in [0.7, 1.3] {
+        let square = mean(&Scenario { gain_scale, ..shared(Flight::SQUARE) });
+        assert!(square.range_m <= 0.20 && square.slot_m <= 0.30 && square.least_m >= 4.2);
+    }
+    let slow = mean(&Scenario { radio: Radio { delay_s: 0.2, loss: 0.2 }, ..shared(Flight::SQUARE) });
+    assert!(slow.range_m <= 0.15 && slow.slot_m <= 0.25);
 }

@@ -120,7 +120,8 @@ fn interpolate(grid: &ElevationGrid, place: LocalPoint) -> Option<(f64, f64)> {
         return None;
     }
     let (row, col) = row_col(grid, place);
-    let nearest = cell(grid, row.round() as usize, col.round() as usize);
+    let nearest = cell(grid, row.round() as usize, col.round() as usize)
+        .or_else(|| bridged(grid, row.round() as usize, col.round() as usize));
     let (row0, col0) = (row.floor(), col.floor());
     if (row - row.round()).abs() < 1e-3 && (col - col.round()).abs() < 1e-3 {
         return nearest;
@@ -146,6 +147,25 @@ fn interpolate(grid: &ElevationGrid, place: LocalPoint) -> Option<(f64, f64)> {
         }
     }
     Some((elevation_m, (variance_m2 / weight).sqrt()))
+}
+
+/// A cell that was not seen, from those two to either side along each axis that has all four: the cubic through them, which keeps 97 % of a wave of ten
+/// cells. A series with holes loses its crests, and stretches between them.
+fn bridged(grid: &ElevationGrid, row: usize, col: usize) -> Option<(f64, f64)> {
+    let (mut elevation_m, mut variance_m2, mut axes) = (0.0, 0.0, 0.0);
+    for (step_row, step_col) in [(1, 0), (0, 1)] {
+        let beside = |steps: isize| {
+            let (r, c) = (row.checked_add_signed(steps * step_row)?, col.checked_add_signed(steps * step_col)?);
+            if r < grid.rows as usize && c < grid.cols as usize { cell(grid, r, c) } else { None }
+        };
+        if let (Some(a), Some(b), Some(c), Some(d)) = (beside(-2), beside(-1), beside(1), beside(2)) {
+            elevation_m += (4.0 * (b.0 + c.0) - (a.0 + d.0)) / 6.0;
+            variance_m2 += (16.0 * (b.1 * b.1 + c.1 * c.1) + a.1 * a.1 + d.1 * d.1) / 36.0;
+            axes += 1.0;
+        }
+    }
+    // Of one axis as of two: neighbours share pixels, and what is averaged may share its error.
+    (axes > 0.0).then(|| (elevation_m / axes, (variance_m2 / axes).sqrt()))
 }
 
 /// Weights of the points at −1, 0, 1 and 2 for a value at `t` in 0 … 1; they add up to one.

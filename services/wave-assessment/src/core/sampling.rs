@@ -5,8 +5,9 @@ use super::series::Series;
 
 /// Correlations further apart than this many mean periods are taken as nothing.
 const LAG_PERIODS: f64 = 5.0;
-/// The degrees of freedom come from the same short window as the variance; so much of them is claimed.
-const CLAIMED: f64 = 0.7;
+/// The degrees of freedom come from the same short window as the variance; so much of them is claimed. Of made seas without noise and gaps, the upper
+/// bound of H_m0 is then under the truth in 2.5 to 3 of 100.
+const CLAIMED: f64 = 0.9;
 /// Lags reach at least this far, seconds.
 const LAG_S_MIN: f64 = 2.0;
 
@@ -18,7 +19,7 @@ const LAG_S_MIN: f64 = 2.0;
 /// independent waves that the window is worth. `None` without data.
 pub(crate) fn degrees_of_freedom(series: &Series, interval_s: f64, period_s: Option<f64>) -> Option<f64> {
     let (table, length) = table(series, interval_s);
-    let used: Vec<&Vec<f64>> = table.iter().flatten().collect();
+    let used: Vec<Gauge> = table.into_iter().flatten().map(Gauge::of).collect();
     let gauges = used.len() as f64;
     let duration_s = length as f64 * interval_s;
     let lag_s = (LAG_PERIODS * period_s.unwrap_or(0.0)).max(LAG_S_MIN).min(duration_s / 3.0);
@@ -63,14 +64,39 @@ fn table(series: &Series, interval_s: f64) -> ([Option<Vec<f64>>; GAUGES], usize
     (table, length)
 }
 
-/// Mean of a(t) b(t + lag) where both are known, weighted down as fewer are, so that far lags do not run wild.
-fn covariance(a: &[f64], b: &[f64], lag: usize) -> f64 {
-    let (sum, count) = a
-        .iter()
-        .zip(&b[lag..])
-        .map(|(x, y)| x * y)
-        .filter(|product| !product.is_nan())
-        .fold((0.0, 0_u32), |(sum, count), product| (sum + product, count + 1));
-    let known = a.iter().filter(|x| !x.is_nan()).count().max(1);
-    if count == 0 { 0.0 } else { sum / known as f64 }
+/// One gauge's elevations, nothing where they are not known, and where they are.
+struct Gauge {
+    elevation_m: Vec<f64>,
+    known: Vec<f64>,
+}
+
+impl Gauge {
+    fn of(elevation_m: Vec<f64>) -> Self {
+        let known = elevation_m.iter().map(|x| f64::from(u8::from(!x.is_nan()))).collect();
+        Self { elevation_m: elevation_m.iter().map(|x| if x.is_nan() { 0.0 } else { *x }).collect(), known }
+    }
+}
+
+/// Mean of a(t) b(t + lag) where both are known, weighted down as lags get longer, so that far ones do not run wild. What is missing here and there
+/// makes a mean no smaller: it would pass for waves that soon forget each other.
+fn covariance(a: &Gauge, b: &Gauge, lag: usize) -> f64 {
+    let pairs = lagged(&a.known, &b.known, lag);
+    let length = a.known.len() as f64;
+    if pairs > 0.0 { lagged(&a.elevation_m, &b.elevation_m, lag) / pairs * (1.0 - lag as f64 / length) } else { 0.0 }
+}
+
+/// Sum of a(t) b(t + lag).
+fn lagged(a: &[f64], b: &[f64], lag: usize) -> f64 {
+    const LANES: usize = 8;
+    let later = b.get(lag..).unwrap_or_default();
+    let (ours, theirs) = (a[..later.len().min(a.len())].chunks_exact(LANES), later.chunks_exact(LANES));
+    let rest: f64 = ours.remainder().iter().zip(theirs.remainder()).map(|(x, y)| x * y).sum();
+    // Sums side by side, which the processor takes at once.
+    let mut sums = [0.0; LANES];
+    for (x, y) in ours.zip(theirs) {
+        for ((sum, x), y) in sums.iter_mut().zip(x).zip(y) {
+            *sum += x * y;
+        }
+    }
+    rest + sums.iter().sum::<f64>()
 }

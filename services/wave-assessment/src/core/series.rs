@@ -210,7 +210,7 @@ pub(crate) fn despike(values: &mut [f64], also: &mut [f64]) -> usize {
     replaced
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
+pub(crate) fn median(mut values: Vec<f64>) -> f64 {
     let middle = values.len() / 2;
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }

@@ -16,7 +16,7 @@ use halcyon_ocean::height::{
 use halcyon_ocean::{Depth, Record, Spline};
 
 use super::gauge::GAUGES;
-use super::hidden::Hidden;
+use super::hidden::{Hidden, whole_m2};
 use super::sampling::degrees_of_freedom;
 use super::series::Series;
 use super::spectrum::Spectral;
@@ -27,11 +27,13 @@ const DENSER: f64 = 4.0;
 /// Heights of single waves scatter a little more than the variance does: their intervals have this share of its freedom.
 const HEIGHT_FREEDOM: f64 = 0.9;
 /// And slopes scatter less: theirs have this many times its freedom.
-const SLOPE_FREEDOM: f64 = 1.8;
+const SLOPE_FREEDOM: f64 = 2.4;
 /// Near the ends of the window a filter cannot know how waves go on: single ones of the hidden part are wrong by about this share.
 const SPLIT_ERROR: f64 = 0.05;
 /// Of what could be waves and is not believed to be, so much may have been believed by mistake.
 const PASSED: f64 = 0.1;
+/// Gauges and all cells see the same waves: they differ by no more than this factor in variance, or one of the two is not believed.
+const WHOLE_MAX: f64 = 1.3;
 /// Two-sided 95 % of the normal distribution.
 const NORMAL_95: f64 = 1.96;
 
@@ -74,8 +76,9 @@ impl Statistics {
 
         // Noise about zero makes waves that are none; a dead band against it swallows small waves that are some. Estimates are the
         // mean of both counts, bounds reach to the further one.
-        let (all, at_each) = waves_at_gauges(series, interval_s, noise_m2.sqrt());
-        let counts = [WaveStatistics::of(&waves_at_gauges(series, interval_s, 0.0).0), WaveStatistics::of(&all)];
+        let records = dense(series, interval_s);
+        let (all, at_each) = waves_at_gauges(&records, noise_m2.sqrt());
+        let counts = [WaveStatistics::of(&waves_at_gauges(&records, 0.0).0), WaveStatistics::of(&all)];
         let counts: Vec<WaveStatistics> = counts.into_iter().flatten().collect();
         let period_s = counts.last().map(|c| c.t_z_s);
         // Where nothing varies there are no degrees of freedom, and nothing that they would scale.
@@ -83,7 +86,11 @@ impl Statistics {
         let above_noise = variance_m2 * variance_factors_95(freedom).0 > 2.0 * noise_m2;
 
         let hidden_m = if let Hidden::Measured { h_m0_m, .. } = hidden { *h_m0_m } else { 0.0 };
-        let scale = Scale { variance_m2, upper_m2, noise_m2, hidden_m };
+        // All cells tell the variance a little better than nine of them, and much better where cells or frames are missing.
+        let waves_m2 = variance_m2 - noise_m2;
+        let share = whole_m2(window, hidden).filter(|_| above_noise).map_or(1.0, |whole_m2| whole_m2 / waves_m2);
+        let whole = if (1.0 / WHOLE_MAX..=WHOLE_MAX).contains(&share) { share } else { share.clamp(1.0, WHOLE_MAX) };
+        let scale = Scale { variance_m2, upper_m2, noise_m2, hidden_m, whole };
         let height = |pick: fn(&WaveStatistics) -> f64, ratio: f64| {
             let heights_m: Vec<f64> = counts.iter().map(pick).collect();
             let heights_m = if heights_m.is_empty() { vec![ratio * variance_m2.sqrt()] } else { heights_m };
@@ -176,6 +183,8 @@ struct Scale {
     upper_m2: f64,
     noise_m2: f64,
     hidden_m: f64,
+    /// Variance of all cells over that of the gauges.
+    whole: f64,
 }
 
 impl Scale {
@@ -186,7 +195,7 @@ impl Scale {
             return Estimate { value: 0.0, low: 0.0, high };
         }
         let (low, high) = variance_factors_95(freedom);
-        let share = |variance_m2: f64| height_m * (variance_m2.max(0.0) / self.variance_m2).sqrt();
+        let share = |variance_m2: f64| height_m * (self.whole * variance_m2.max(0.0) / self.variance_m2).sqrt();
         Estimate {
             value: share(self.variance_m2 - self.noise_m2),
             low: share(self.variance_m2 * low - self.noise_m2 - PASSED * (self.upper_m2 - self.variance_m2)),
@@ -211,19 +220,26 @@ impl Scale {
     }
 }
 
-/// Waves of every stretch, and how many each gauge had.
-fn waves_at_gauges(series: &Series, interval_s: f64, deadband_m: f64) -> (Vec<Wave>, [usize; GAUGES]) {
+/// Every stretch drawn densely, and its gauge.
+fn dense(series: &Series, interval_s: f64) -> Vec<(usize, Record)> {
     let step_s = interval_s / DENSER;
+    let drawn = |stretch: &super::series::Stretch| {
+        let (start_s, end_s) = (*stretch.times_s.first()?, *stretch.times_s.last()?);
+        // Stamps rise and readings are finite, so neither can fail; a stretch that did would only be one stretch less.
+        let curve = Spline::new(stretch.times_s.clone(), stretch.elevation_m.clone()).ok()?;
+        let dense_m = curve.sampled(start_s, step_s, ((end_s - start_s) / step_s).floor() as usize + 1);
+        Some((stretch.slot, Record::new(dense_m, 1.0 / step_s).ok()?))
+    };
+    series.stretches.iter().filter_map(drawn).collect()
+}
+
+/// Waves of every record, and how many each gauge had.
+fn waves_at_gauges(records: &[(usize, Record)], deadband_m: f64) -> (Vec<Wave>, [usize; GAUGES]) {
     let mut all = Vec::new();
     let mut at_each = [0; GAUGES];
-    for stretch in &series.stretches {
-        let (Some(start_s), Some(end_s)) = (stretch.times_s.first(), stretch.times_s.last()) else { continue };
-        // Stamps rise and readings are finite, so neither can fail; a stretch that did would only be one stretch less.
-        let Ok(curve) = Spline::new(stretch.times_s.clone(), stretch.elevation_m.clone()) else { continue };
-        let dense_m = curve.sampled(*start_s, step_s, ((end_s - start_s) / step_s).floor() as usize + 1);
-        let Ok(record) = Record::new(dense_m, 1.0 / step_s) else { continue };
-        let found = waves(&record, Crossing::Up, deadband_m);
-        at_each[stretch.slot] += found.len();
+    for (slot, record) in records {
+        let found = waves(record, Crossing::Up, deadband_m);
+        at_each[*slot] += found.len();
         all.extend(found);
     }
     (all, at_each)
@@ -248,7 +264,7 @@ fn max(values: &[f64]) -> f64 {
 }
 
 /// Root mean square slope over all frames. It has more degrees of freedom than the variance: a whole patch is seen, and steep waves are short
-/// (2.4 times as many over made seas).
+/// (2.8 times as many over wind seas of 1 to 1.5 s).
 fn slope(window: &Window, freedom: f64) -> Option<Estimate> {
     let slopes: Vec<_> = window.frames().iter().filter_map(|f| f.slope).collect();
     if slopes.is_empty() {

@@ -15,8 +15,8 @@ fn films_show_the_sea_that_is_meant() {
     let camera = Camera { rows: 9, cols: 9, cell_m: 0.4, sigma_m: 0.0, level_sigma_m: 0.0, rate_hz: 10.0, ..Camera::default() };
     let truth = Truth::of(&sea, camera.cell_m);
     let (mut m0, mut m2, mut slope, mut seen) = (0.0, 0.0, 0.0, 0.0);
-    for seed in 0..40 {
-        let film = camera.film(&sea, 300, &rig(), seed);
+    for seed in 0..80 {
+        let film = camera.film(&sea, 1000, &rig(), seed);
         let at = |frame: usize, cell: usize| f64::from(film[frame].grid.elevation_m[cell]) + film[frame].level_m.unwrap();
         for frame in 1..film.len() - 1 {
             for cell in [0, 5, 30, 44] {
@@ -46,7 +46,8 @@ fn waves_travel_the_way_they_point() {
     let at = |frame: usize, cell: usize| f64::from(film[frame].grid.elevation_m[cell]) + film[frame].level_m.unwrap();
     // A wave of 1.6 s is 4 m long and runs a metre in 0.4 s, four frames.
     let agreement = |lag: i64| -> f64 { (10..390).map(|i| at(i, 0) * at((i as i64 + lag) as usize, 2)).sum() };
-    assert!(agreement(4) > 2.0 * agreement(-4).abs(), "{} {}", agreement(4), agreement(-4));
+    // And the other way it is half a period off.
+    assert!(agreement(4) > 0.0 && agreement(-4) < -0.5 * agreement(4), "{} {}", agreement(4), agreement(-4));
     let across: f64 = (10..390).map(|i| (at(i, 0) - at(i, 1)).powi(2)).sum();
     assert!(across < 0.02 * agreement(4), "crests lie across");
 }

@@ -31,40 +31,49 @@ pub(super) struct Args {
 #[derive(Debug, clap::Subcommand)]
 enum Command {
     /// List the vehicles
+    #[command(after_help = "Example: halcyon vehicle list --json")]
     List,
     /// Show one vehicle
+    #[command(after_help = "Example: halcyon vehicle show follower-1")]
     Show {
         /// Its id
         id: String,
     },
     /// Command a vehicle: arm, take off, go to, follow, hold, land, return …
-    Command {
+    #[command(after_help = "Example: halcyon vehicle command follower-1 go-to --north 30 --east 12 --height 6")]
+    #[command(name = "command")]
+    Tell {
         /// Its id
         id: String,
         #[command(subcommand)]
         action: command::Action,
     },
     /// Read, set, save and load the autopilot's parameters
+    #[command(after_help = "Example: halcyon vehicle parameters load follower-1 tuned.param --dry-run")]
     Parameters {
         #[command(subcommand)]
         action: parameters::Action,
     },
     /// The mission that the autopilot keeps
+    #[command(after_help = "Example: halcyon vehicle mission upload follower-1 survey.plan")]
     Mission {
         #[command(subcommand)]
         action: items::Action,
     },
     /// The fence that the autopilot keeps
+    #[command(after_help = "Example: halcyon vehicle fence upload follower-1 site.plan")]
     Fence {
         #[command(subcommand)]
         action: items::Action,
     },
     /// The rally points that the autopilot keeps
+    #[command(after_help = "Example: halcyon vehicle rally show follower-1")]
     Rally {
         #[command(subcommand)]
         action: items::Action,
     },
     /// Let the payload go; on the ground or the water only
+    #[command(after_help = "Example: halcyon vehicle release follower-1")]
     Release {
         /// Its id
         id: String,
@@ -84,13 +93,13 @@ async fn carry_out(client: &Client, command: Command, json: bool) -> anyhow::Res
         Command::Show { id } => {
             let vehicle = client.send(Method::GET, &path(&id, "")?, None).await?;
             if json {
-                output::json(&vehicle)?
+                output::json(&vehicle)?;
             } else {
-                show(&vehicle)?
+                show(&vehicle)?;
             }
             Ok(ExitCode::SUCCESS)
         }
-        Command::Command { id, action } => told(client, &id, action.body(), json).await,
+        Command::Tell { id, action } => told(client, &id, action.body(), json).await,
         Command::Release { id } => told(client, &id, json!({ "action": "release_payload" }), json).await,
         Command::Parameters { action } => parameters::run(client, action, json).await,
         Command::Mission { action } => items::run(client, ItemKind::Mission, action, json).await,
@@ -108,9 +117,9 @@ fn path(id: &str, what: &str) -> anyhow::Result<String> {
 async fn told(client: &Client, id: &str, body: Value, json: bool) -> anyhow::Result<ExitCode> {
     let answer = client.send(Method::POST, &path(id, "commands")?, Some(body)).await?;
     if json {
-        output::json(&answer)?
+        output::json(&answer)?;
     } else {
-        output::line(&format!("{id}: {}", text(&answer, "reason")))?
+        output::line(&format!("{id}: {}", text(&answer, "reason")))?;
     }
     Ok(ExitCode::SUCCESS)
 }

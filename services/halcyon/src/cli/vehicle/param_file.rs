@@ -18,8 +18,7 @@ pub(super) fn read(text: &str) -> Result<BTreeMap<String, f64>, String> {
         let columns: Vec<&str> =
             line.split(|c: char| c == ',' || c.is_whitespace()).filter(|column| !column.is_empty()).collect();
         let (name, value) = match columns[..] {
-            [name, value] => (name, value),
-            [_, _, name, value, _] => (name, value),
+            [name, value] | [_, _, name, value, _] => (name, value),
             _ => return Err(wrong("expected NAME,VALUE or NAME VALUE, or QGroundControl's five columns")),
         };
         halcyon_model::ParameterName::new(name).map_err(|error| wrong(&error.to_string()))?;

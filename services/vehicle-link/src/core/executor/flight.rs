@@ -22,7 +22,7 @@ pub(super) const LOW_M: f64 = 0.7;
 /// A velocity that the separation filter has changed by more than this is braked with an acceleration on top, up to so much: metres
 /// per second, metres per second squared.
 const REFUSED_MPS: f64 = 0.3;
-const BRAKING_MPS2_MAX: f64 = 2.5;
+const BRAKING_MPS2_MAX: f64 = 4.0;
 /// Setpoints end this far inside the fence, metres.
 const FENCE_INSIDE_M: f64 = 2.0;
 

@@ -8,7 +8,7 @@ use super::{Executor, Goal, Output};
 use crate::core::guidance::{Reference, SLOT_GAIN_HZ, Setpoint, limit_velocity};
 use crate::core::law::{self, Law};
 use crate::core::separation::{self, Obstacle};
-use crate::core::track::Motion;
+use crate::core::track::{Motion, Track};
 
 /// The reference has joined the slot when it is this near, metres, and this nearly as fast, metres per second. What is left of both
 /// then dies away, and every correction of the slot goes through at once.
@@ -134,16 +134,19 @@ impl Executor {
     pub(super) fn obstacles(&self, now: Stamp) -> Vec<Obstacle> {
         let limits = &self.config.limits;
         let follows = matches!(self.flying, Some(Goal::Follow { .. }));
-        let near = |(id, track)| {
-            let mut obstacle = separation::obstacle(track, follows, limits, now)?;
-            if let Some(apart_m) = self.planned_apart_m(id) {
-                let usual_m = limits.separation_m_min + limits.separation_margin_m;
-                obstacle.keep_m -= (usual_m - (apart_m - limits.slot_slack_m)).max(0.0);
-            }
+        let near = |(id, track): (&VehicleId, &Track)| {
+            let usual_m = limits.separation_m_min + limits.separation_margin_m;
+            let closer_m = self.planned_apart_m(id).map_or(0.0, |apart_m| (usual_m - (apart_m - limits.slot_slack_m)).max(0.0));
+            let here = separation::obstacle(track, follows, limits, now);
+            let onward = separation::onward(track, follows, limits, now);
             // One whose position has just jumped may be at either place.
-            Some(std::iter::once(obstacle).chain(self.before_jump(id, &obstacle, now)))
+            let before = here.as_ref().and_then(|here| self.before_jump(id, here, now));
+            here.into_iter()
+                .chain(onward)
+                .chain(before)
+                .map(move |obstacle| Obstacle { keep_m: obstacle.keep_m - closer_m, ..obstacle })
         };
-        self.neighbours.iter().filter_map(near).flatten().collect()
+        self.neighbours.iter().flat_map(near).collect()
     }
 
     /// How far apart the formation has this vehicle and another, metres.

@@ -17,6 +17,7 @@ use crate::core::executor::{Executor, ExecutorConfig, Output};
 use crate::core::guidance::Guidance;
 use crate::core::law::offset_ned_m;
 use crate::core::limits::{FailSafeLimits, Limits};
+use crate::core::payload::Payload;
 use air::{Air, Message};
 use craft::{Craft, frame};
 use scene::Pilot;
@@ -124,6 +125,10 @@ impl Swarm {
         if scenario.trouble == Trouble::Passing {
             places.push(("stranger-1".to_owned(), Vector3::new(90.0, 0.0, -HEIGHT_M)));
         }
+        let mut limits = Limits::default();
+        if !scenario.separation {
+            (limits.separation_m_min, limits.separation_margin_m, limits.separation_parked_m) = (0.1, 0.0, 0.1);
+        }
         let mut crafts = Vec::new();
         let mut executors = Vec::new();
         for (name, position_m) in places {
@@ -132,10 +137,11 @@ impl Swarm {
             crafts.push(Craft::new(id.clone(), position_m, airframe, chance.fork()));
             executors.push(Executor::new(ExecutorConfig {
                 vehicle: id,
-                limits: Limits::default(),
+                limits: limits.clone(),
                 fail_safe: FailSafeLimits::default(),
                 guidance: Guidance::default(),
                 home_height_m: 0.0,
+                payload: Payload::default(),
                 frame: frame(),
             }));
         }

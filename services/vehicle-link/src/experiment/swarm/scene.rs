@@ -86,6 +86,8 @@ pub struct SwarmScenario {
     pub trouble: Trouble,
     /// Who flies the leader.
     pub lead: Lead,
+    /// Whether the separation filter keeps distances; without it a formation shows how near it would come.
+    pub separation: bool,
     /// Standard deviation of each receiver's error, metres.
     pub wander_m: f64,
     /// Standard deviation of the gusts' push, metres per second squared.
@@ -108,6 +110,7 @@ impl SwarmScenario {
             loss: 0.3,
             trouble: Trouble::None,
             lead: Lead::Pilot,
+            separation: true,
             wander_m: 0.02,
             gust_mps2: 0.3,
             duration_s: 60.0,
@@ -130,12 +133,12 @@ impl SwarmScenario {
         self.slots().iter().map(|slot| slot.forward_m.hypot(slot.right_m)).fold(0.0, f64::max)
     }
 
-    /// Gains within 30 % of what guidance believes, and a lag within a half.
+    /// Gains and a lag within 30 % of what guidance believes.
     pub(super) fn airframe(&self, chance: &mut Chance) -> Airframe {
         Airframe {
             position_gain_hz: chance.between(0.7, 1.3),
             velocity_gain_hz: 2.0 * chance.between(0.7, 1.3),
-            lean_lag_s: 0.26 * chance.between(0.7, 1.5),
+            lean_lag_s: 0.26 * chance.between(0.7, 1.3),
             gust_mps2: self.gust_mps2,
             wander_m: self.wander_m,
         }

@@ -6,7 +6,7 @@
 //! parabola takes the place of −k².
 
 use halcyon_model::{LocalPoint, SurfacePatch, grid_error};
-use nalgebra::{Matrix6, Vector6};
+use nalgebra::{Matrix2, Matrix4, Matrix6, Vector2, Vector4, Vector6};
 
 use crate::core::patch::cell;
 use crate::core::smooth::CellErrors;
@@ -32,11 +32,26 @@ pub(crate) struct Bend {
     /// Mean square of what the parabola leaves of the elevations, m², and what the cells' own errors make of it.
     pub residual_m2: f64,
     pub own_m2: f64,
+    /// Means over the cells seen, metres and m²: of the elevation, of its square, and of its product with the distance east and north of the
+    /// middle …
+    pub mean_m: f64,
+    pub square_m2: f64,
+    pub rise_m2: [f64; 2],
+    /// … and of the squares of those distances, east and north, and of their product, m².
+    pub moments_m2: [f64; 3],
     /// Sides of the rectangle that has the second moments of the cells seen, metres.
     pub sides_m: [f64; 2],
 }
 
 impl Bend {
+    /// Mean square of all cells' elevations with the patch lifted by `level_m` and tilted by `tilt`, rise over run east and north, m².
+    pub(super) fn square_with_m2(&self, level_m: f64, tilt: [f64; 2]) -> f64 {
+        let ([east, north], [xx, yy, xy]) = (tilt, self.moments_m2);
+        let lifted = self.square_m2 + 2.0 * level_m * self.mean_m + level_m * level_m;
+        let tilted = 2.0 * (east * self.rise_m2[0] + north * self.rise_m2[1]);
+        lifted + tilted + east * east * xx + north * north * yy + 2.0 * east * north * xy
+    }
+
     /// Of a grid; `None` where too little of it was seen.
     pub(crate) fn of(patch: &SurfacePatch) -> Option<Self> {
         let (grid, error_length_m) = (&patch.grid, patch.error_length_m);
@@ -80,6 +95,10 @@ impl Bend {
             middle: LocalPoint::new(grid.south_west_north_m + row0 * grid.cell_m, grid.south_west_east_m + col0 * grid.cell_m),
             residual_m2: (squares_m2 - parabola.dot(&right)).max(0.0) / count as f64,
             own_m2,
+            mean_m: right[0] / count as f64,
+            square_m2: squares_m2 / count as f64,
+            rise_m2: [right[1] / count as f64, right[2] / count as f64],
+            moments_m2: moments,
             sides_m: [middle + half, middle - half].map(|moment| (12.0 * moment.max(0.0)).sqrt()),
         };
         (bend.half_laplacian_per_m.is_finite() && bend.sigma_per_m.is_finite()).then_some(bend)
@@ -118,13 +137,16 @@ pub(super) fn bend_of_residual_per_m4(wavenumber_min_radpm: f64, sides_m: [f64; 
     const ACROSS: i32 = 10;
     const STEPS: i32 = 8;
     let half = sides_m.map(|side_m| 0.5 * side_m);
-    let places: Vec<(f64, f64)> = (0..ACROSS * ACROSS)
+    // One half of the places: at the others a cosine is the same and a sine the opposite, and so are the terms of a parabola.
+    let places: Vec<(f64, f64)> = (0..ACROSS * ACROSS / 2)
         .map(|i| [i / ACROSS, i % ACROSS].map(|at| 2.0 * (f64::from(at) + 0.5) / f64::from(ACROSS) - 1.0))
         .map(|[y, x]| (x * half[0], y * half[1]))
         .collect();
-    let basis = |(x, y): (f64, f64)| Vector6::new(1.0, x, y, x * x, x * y, y * y);
-    let normal: Matrix6<f64> = places.iter().map(|place| basis(*place) * basis(*place).transpose()).sum();
-    let Some(factor) = normal.cholesky() else { return f64::INFINITY };
+    let even = |(x, y): (f64, f64)| Vector4::new(1.0, x * x, x * y, y * y);
+    let odd = |(x, y): (f64, f64)| Vector2::new(x, y);
+    let evens: Matrix4<f64> = places.iter().map(|place| even(*place) * even(*place).transpose()).sum();
+    let odds: Matrix2<f64> = places.iter().map(|place| odd(*place) * odd(*place).transpose()).sum();
+    let (Some(evens), Some(odds)) = (evens.cholesky(), odds.cholesky()) else { return f64::INFINITY };
     let longest = wavenumber_min_radpm;
     // Down to waves that the grid of places still resolves; shorter ones bend nothing.
     let shortest = (0.5 * std::f64::consts::PI * f64::from(ACROSS) / sides_m[0].max(sides_m[1])).max(longest);
@@ -135,14 +157,17 @@ pub(super) fn bend_of_residual_per_m4(wavenumber_min_radpm: f64, sides_m: [f64; 
         let energy = k_radpm.powi(-2);
         for direction in 0..DIRECTIONS {
             let (sin, cos) = (std::f64::consts::PI * (f64::from(direction) + 0.5) / f64::from(DIRECTIONS)).sin_cos();
-            for wave in [f64::cos, f64::sin] {
-                let elevation = |(x, y): (f64, f64)| wave(k_radpm * (x * cos + y * sin));
-                let right: Vector6<f64> = places.iter().map(|place| basis(*place) * elevation(*place)).sum();
-                let parabola = factor.solve(&right);
-                let squares: f64 = places.iter().map(|place| elevation(*place).powi(2)).sum();
-                bends += energy * (parabola[3] + parabola[5]).powi(2);
-                residuals += energy * (squares - parabola.dot(&right)) / places.len() as f64;
+            let (mut of_cosine, mut of_sine) = (Vector4::zeros(), Vector2::zeros());
+            for place in &places {
+                let (sine, cosine) = (k_radpm * (place.0 * cos + place.1 * sin)).sin_cos();
+                of_cosine += even(*place) * cosine;
+                of_sine += odd(*place) * sine;
             }
+            let (parabola, plane) = (evens.solve(&of_cosine), odds.solve(&of_sine));
+            bends += energy * (parabola[1] + parabola[3]).powi(2);
+            // The squares of both add up to one at each place.
+            let left = places.len() as f64 - parabola.dot(&of_cosine) - plane.dot(&of_sine);
+            residuals += energy * left / places.len() as f64;
         }
     }
     bends / residuals.max(f64::MIN_POSITIVE)

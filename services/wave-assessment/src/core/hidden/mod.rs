@@ -19,7 +19,7 @@ use halcyon_ocean::filter::Mirrored;
 use halcyon_ocean::{Depth, Record, Spline};
 use splitter::{Shape, Splitter};
 
-use super::series::{despike, runs};
+use super::series::{despike, median, runs};
 use super::window::{Frame, Window};
 use crate::config::Config;
 
@@ -27,6 +27,9 @@ use crate::config::Config;
 const KNOWN_MIN: f64 = 0.9;
 /// Fewer samples in a row than this cannot be filtered.
 const SAMPLES_MIN: usize = 16;
+/// A frame whose mean square stands out from both neighbours by so many medians is a spike: a patch that sees one point of a wave reaches 25 at 3.4
+/// deviations.
+const SPIKE_SQUARE: f64 = 25.0;
 /// The cells' own errors are wrong by this share.
 const OWN_DOUBT: f64 = 0.1;
 
@@ -90,6 +93,29 @@ impl Hidden {
             Self::Unknown => (0.0, 0.0),
         }
     }
+}
+
+/// Variance of the elevation over all cells of all frames, m², less the cells' own errors: of the same waves as the gauges', from every cell, and
+/// whatever holes there are. `None` without levels or bends.
+pub(crate) fn whole_m2(window: &Window, hidden: &Hidden) -> Option<f64> {
+    let Hidden::Measured { frames: found, .. } = hidden else { return None };
+    let of = |(frame, hidden): (&Frame, &Option<HiddenFrame>)| {
+        let (bend, hidden) = (frame.bend.as_ref()?, hidden.as_ref()?);
+        let tilt = hidden.waves.slope.map_or([0.0; 2], |[east, north]| [east - bend.grid_slope[0], north - bend.grid_slope[1]]);
+        Some(bend.square_with_m2(hidden.waves.level_m, tilt) - bend.own_m2)
+    };
+    let squares_m2: Vec<f64> = window.frames().iter().zip(found).filter_map(of).collect();
+    if squares_m2.is_empty() {
+        return None;
+    }
+    let spike_m2 = SPIKE_SQUARE * median(squares_m2.clone()).max(0.0);
+    let is_spike = |i: usize| {
+        let neighbours = [i.checked_sub(1), Some(i + 1)].into_iter().flatten().filter_map(|j| squares_m2.get(j));
+        squares_m2[i] > spike_m2 && neighbours.into_iter().all(|beside| squares_m2[i] - beside > spike_m2)
+    };
+    let (sum_m2, count) =
+        (0..squares_m2.len()).filter(|i| !is_spike(*i)).fold((0.0, 0.0), |(sum, count), i| (sum + squares_m2[i], count + 1.0));
+    (count > 0.0).then(|| sum_m2 / count)
 }
 
 /// Splits levels and tilts of `window`.

@@ -1,0 +1,223 @@
+//! Bytes to and from one endpoint: frames in, frames out.
+
+use std::collections::BTreeMap;
+use std::io;
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::Duration;
+
+use halcyon_chassis::Clock;
+use tokio::io::{AsyncRead, AsyncReadExt as _, AsyncWrite, AsyncWriteExt as _};
+use tokio::net::{TcpListener, TcpStream, UdpSocket};
+use tokio_serial::SerialPortBuilderExt as _;
+
+use crate::core::frame::{Frame, Framer};
+use crate::endpoint::Endpoint;
+
+/// Making a connection may take this long.
+pub(super) const CONNECT: Duration = Duration::from_secs(5);
+/// The largest datagram, and what is read of a stream at once.
+const READ_BYTES: usize = 64 * 1024;
+/// Vehicles on one UDP socket whose places are remembered.
+const PLACES_MAX: usize = 32;
+
+/// Where frames come from.
+pub(super) struct Reader {
+    source: Source,
+    buffer: Vec<u8>,
+    unframed_bytes: usize,
+}
+
+enum Source {
+    Stream(Box<dyn AsyncRead + Send + Unpin>, Framer),
+    Datagrams(Arc<UdpSocket>),
+}
+
+/// Where frames go.
+pub(super) enum Writer {
+    Stream(Box<dyn AsyncWrite + Send + Unpin>),
+    Datagrams {
+        socket: Arc<UdpSocket>,
+        /// The one place that was configured; else whoever was heard.
+        fixed: Option<SocketAddr>,
+        places: Places,
+    },
+}
+
+/// Which system was heard from where: several vehicles may share a socket.
+#[derive(Debug, Default)]
+pub(super) struct Places {
+    by_system: BTreeMap<u8, SocketAddr>,
+    last: Option<SocketAddr>,
+}
+
+/// Who is meant by what is sent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum To {
+    /// One vehicle; before it was heard, whoever was heard last.
+    System(u8),
+    /// Every vehicle on the link.
+    All,
+}
+
+impl Places {
+    /// A system spoke from there. A frame that can't be believed must not come here: it would draw ours to its sender.
+    fn learn(&mut self, system: u8, from: SocketAddr) {
+        self.last = Some(from);
+        if self.by_system.len() < PLACES_MAX || self.by_system.contains_key(&system) {
+            self.by_system.insert(system, from);
+        }
+    }
+
+    fn of(&self, to: To) -> Vec<SocketAddr> {
+        match to {
+            To::System(system) => self.by_system.get(&system).copied().or(self.last).into_iter().collect(),
+            To::All => {
+                let mut places: Vec<SocketAddr> = self.by_system.values().copied().collect();
+                places.sort_unstable();
+                places.dedup();
+                places
+            }
+        }
+    }
+}
+
+impl Reader {
+    fn new(source: Source) -> Self {
+        Self { source, buffer: vec![0; READ_BYTES], unframed_bytes: 0 }
+    }
+
+    /// The frames of the next bytes, perhaps none, and where they came from if that can vary. Cancel-safe.
+    pub(super) async fn frames(&mut self) -> io::Result<(Vec<Frame>, Option<SocketAddr>)> {
+        match &mut self.source {
+            Source::Stream(stream, framer) => {
+                let length = stream.read(&mut self.buffer).await?;
+                if length == 0 {
+                    return Err(io::Error::new(io::ErrorKind::UnexpectedEof, "the other end closed the connection"));
+                }
+                let frames = framer.stream(self.buffer.get(..length).unwrap_or_default());
+                self.unframed_bytes = if frames.is_empty() { self.unframed_bytes.saturating_add(length) } else { 0 };
+                Ok((frames, None))
+            }
+            Source::Datagrams(socket) => {
+                let (length, from) = socket.recv_from(&mut self.buffer).await?;
+                Ok((Framer::datagram(self.buffer.get(..length).unwrap_or_default()), Some(from)))
+            }
+        }
+    }
+}
+
+impl Reader {
+    /// What has come of a stream since its last frame.
+    pub(super) fn unframed_bytes(&self) -> usize {
+        self.unframed_bytes
+    }
+}
+
+impl Writer {
+    /// Sends one frame. Over UDP before anyone was heard there is nobody to send to, which is no error.
+    pub(super) async fn send(&mut self, bytes: &[u8], to: To) -> io::Result<()> {
+        match self {
+            Self::Stream(stream) => {
+                stream.write_all(bytes).await?;
+                stream.flush().await
+            }
+            Self::Datagrams { socket, fixed: Some(place), .. } => socket.send_to(bytes, *place).await.map(|_| ()),
+            Self::Datagrams { socket, fixed: None, places } => {
+                for place in places.of(to) {
+                    socket.send_to(bytes, place).await?;
+                }
+                Ok(())
+            }
+        }
+    }
+
+    /// A believable frame of `system` came from there.
+    pub(super) fn learn(&mut self, system: u8, from: Option<SocketAddr>) {
+        if let (Self::Datagrams { places, .. }, Some(from)) = (self, from) {
+            places.learn(system, from);
+        }
+    }
+}
+
+/// Both directions of a stream.
+fn stream<S: AsyncRead + AsyncWrite + Send + Unpin + 'static>(stream: S) -> (Reader, Writer) {
+    let (read, write) = tokio::io::split(stream);
+    (Reader::new(Source::Stream(Box::new(read), Framer::default())), Writer::Stream(Box::new(write)))
+}
+
+/// Both directions of a TCP connection.
+pub(super) fn tcp(connection: TcpStream) -> io::Result<(Reader, Writer)> {
+    connection.set_nodelay(true)?;
+    Ok(stream(connection))
+}
+
+fn datagrams(socket: UdpSocket, fixed: Option<SocketAddr>) -> (Reader, Writer) {
+    let socket = Arc::new(socket);
+    let reader = Reader::new(Source::Datagrams(socket.clone()));
+    (reader, Writer::Datagrams { socket, fixed, places: Places::default() })
+}
+
+/// Opens an endpoint. A listener waits for its caller as long as that takes; the others must succeed soon.
+pub(super) async fn open(endpoint: &Endpoint, clock: &Clock) -> Result<(Reader, Writer), String> {
+    match endpoint {
+        Endpoint::TcpOut(place) => {
+            let connecting = TcpStream::connect(resolve(place, clock).await?);
+            let connected = clock.timeout(CONNECT, connecting).await.map_err(|_| "no connection in 5 s".to_owned())?;
+            connected.and_then(tcp).map_err(|error| format!("{place}: {error}"))
+        }
+        Endpoint::TcpIn(place) => {
+            let listener =
+                TcpListener::bind(resolve(place, clock).await?).await.map_err(|error| format!("{place}: {error}"))?;
+            let (connection, _) = listener.accept().await.map_err(|error| format!("{place}: {error}"))?;
+            tcp(connection).map_err(|error| format!("{place}: {error}"))
+        }
+        Endpoint::UdpOut(place) => {
+            let place = resolve(place, clock).await?;
+            Ok(datagrams(any_port(place).await.map_err(|error| format!("{place}: {error}"))?, Some(place)))
+        }
+        Endpoint::UdpIn(place) => {
+            let socket = UdpSocket::bind(resolve(place, clock).await?).await.map_err(|error| format!("{place}: {error}"))?;
+            Ok(datagrams(socket, None))
+        }
+        Endpoint::Serial { device, baud_bps } => {
+            let port =
+                tokio_serial::new(device, *baud_bps).open_native_async().map_err(|error| format!("{device}: {error}"))?;
+            Ok(stream(port))
+        }
+    }
+}
+
+/// A socket from which `place` can be reached.
+pub(super) async fn any_port(place: SocketAddr) -> io::Result<UdpSocket> {
+    UdpSocket::bind(if place.is_ipv4() { "0.0.0.0:0" } else { "[::]:0" }).await
+}
+
+/// A name's address, without holding up the thread.
+pub(super) async fn resolve(place: &str, clock: &Clock) -> Result<SocketAddr, String> {
+    let lookup = clock.timeout(CONNECT, tokio::net::lookup_host(place)).await;
+    let mut addresses =
+        lookup.map_err(|_| format!("{place}: no answer to its name"))?.map_err(|error| format!("{place}: {error}"))?;
+    addresses.next().ok_or_else(|| format!("{place} has no address"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_vehicle_on_a_socket_is_answered_where_it_spoke() {
+        let place = |port| SocketAddr::from(([127, 0, 0, 1], port));
+        let mut places = Places::default();
+        assert!(places.of(To::System(7)).is_empty());
+        places.learn(7, place(1007));
+        places.learn(8, place(1008));
+        assert_eq!(places.of(To::System(7)), [place(1007)]);
+        assert_eq!(places.of(To::System(9)), [place(1008)], "not heard: whoever spoke last");
+        assert_eq!(places.of(To::All), [place(1007), place(1008)]);
+        for system in 0..=255 {
+            places.learn(system, place(2000));
+        }
+        assert!(places.by_system.len() <= PLACES_MAX);
+    }
+}
