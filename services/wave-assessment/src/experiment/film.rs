@@ -3,7 +3,7 @@
 //! All waves run at whole lines of one long record, each line with waves from several directions, each of a random (complex normal) amplitude: a
 //! Gaussian sea that repeats itself only after the record, which is several times as long as any film. One direction a line would make a sea that
 //! looks the same wherever one stands (Jefferys 1987), so that a patch would tell no more than a point. At each cell the lines add up by one
-//! transform: a hundred times less work than wave by wave.
+//! transform, which is far less work than wave by wave.
 
 use std::f64::consts::{PI, TAU};
 
