@@ -75,6 +75,7 @@ impl Scene {
             match effect {
                 Effect::Send(message) => allowed(&message),
                 Effect::Done(_, command, _) => assert!(matches!(command, Command::SetInterval(_)), "{command:?}"),
+                Effect::Transferred(_, ending) => panic!("nobody asked for a transfer: {ending:?}"),
             }
         }
         if let Some((state, _)) = self.autopilot.state(self.now) {

@@ -237,9 +237,9 @@ fn the_published_record_has_its_published_waves() {
     let record: Vec<f64> = text.split_whitespace().map(|line| line.parse().unwrap()).collect();
     for (number, (burst, expected)) in report.bursts.iter().zip(published).enumerate() {
         let (z, s) = (burst.zero_up.unwrap(), burst.spectrum.unwrap());
-        // Waves are defined, and a spectrum's estimate is not. The table's is that of GNU Octave's `pwelch` as it is by default, with 512 lines:
-        // Hamming's window over ⌈√(n/(1 − ½))⌉ = 64 samples, half overlapped, followed by zeros; from 0.05 Hz; and its f_p is the mean of f
-        // weighed by S⁵, no line's.
+        // Waves are defined, and a spectrum's estimate is not. Of all windows, lengths and paddings that were tried, these alone give the
+        // table's fifteen values: Hamming's window (or Hann's) over 64 samples, half overlapped, followed by zeros to 512; from 0.05 Hz;
+        // and an f_p that is the mean of f weighed by S⁵, no line's. That 64 is ⌈√(2n)⌉ hints at a default of GNU Octave's `pwelch`.
         let readings: Vec<f64> = record[number * 2048..][..2048].to_vec();
         let welch = Welch { segment_samples: 64, taper: Taper::Hamming };
         let theirs = welch.spectrum_padded(&Record::new(readings, 2.0).unwrap().without_trend(), 512).unwrap();
