@@ -264,7 +264,7 @@ async fn formations_are_ordered_and_disbanded_in_the_planners_words() {
     bad("shape", json!("ring"), "ring").await;
     bad("spacing_m", json!(0), "spacing_m must be above 0").await;
     bad("spacing_m", json!(1e9), "spacing_m must be above 0").await;
-    bad("followers", json!(["a", ""]), "empty").await;
+    bad("followers", json!(["a", ""]), "1 to 64 characters").await;
     gateway.post("/api/v1/formations/nobody/disband", &json!(null)).await.is_problem(404, "no vehicle nobody");
     assert_eq!(gateway.played.mission_commands.lock().unwrap().len(), 1);
 }

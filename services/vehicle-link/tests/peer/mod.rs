@@ -37,7 +37,7 @@ pub(crate) struct Shared {
     pub(crate) garbage: Mutex<Vec<u8>>,
     /// Answer arming with a refusal.
     pub(crate) refuse_arming: AtomicBool,
-    /// Don't answer the first try of anything.
+    /// Don't hear the first try to set a mode.
     pub(crate) deaf_once: AtomicBool,
     mode: Mutex<u32>,
     stop: AtomicBool,
@@ -249,7 +249,9 @@ fn read(reading: Box<dyn Wire>, shared: &Shared, out: &Mutex<Vec<MavMessage>>) {
         let own = shared.system.load(Ordering::Relaxed);
         let is_for_it = message.target_system_id().is_none_or(|target| target == 0 || target == own);
         match &message {
-            MavMessage::COMMAND_LONG(command) if is_for_it && !shared.deaf_once.swap(false, Ordering::Relaxed) => {
+            MavMessage::COMMAND_LONG(command)
+                if command.command == MavCmd::MAV_CMD_DO_SET_MODE && shared.deaf_once.swap(false, Ordering::Relaxed) => {}
+            MavMessage::COMMAND_LONG(command) if is_for_it => {
                 out.lock().unwrap().extend(answer(command, header, shared));
             }
             MavMessage::TIMESYNC(question) if is_for_it && question.tc1 == 0 => {
