@@ -168,6 +168,11 @@ impl<'a> Service<'a> {
                     self.executor.observe_self(state, mode_heard, now);
                 }
             }
+            LinkEvent::Station(system, what) => {
+                if self.autopilot.is_system(system) {
+                    self.executor.observe_station(what);
+                }
+            }
             LinkEvent::Unread(header) => self.autopilot.observe_unread(header, self.context.clock.now()),
             LinkEvent::Rejected(verdict) => {
                 let now = self.context.clock.now();

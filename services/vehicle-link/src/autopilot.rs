@@ -147,6 +147,12 @@ impl Autopilot {
         self.loss.share()
     }
 
+    /// Whether a message for `system` is for our autopilot; 0 is everybody.
+    #[must_use]
+    pub fn is_system(&self, system: u8) -> bool {
+        self.address.is_some_and(|address| system == 0 || address.system() == system)
+    }
+
     /// Whether the autopilot has been heard.
     #[must_use]
     pub fn found(&self) -> bool {

@@ -46,6 +46,8 @@ pub enum Command {
         /// Height above home, metres.
         height_above_home_m: f64,
     },
+    /// Home is here, and stays here.
+    SetHome,
     /// Send a message at an interval.
     SetInterval(Stream),
     /// Open or close what holds the payload.
@@ -314,6 +316,7 @@ impl Command {
             Self::Arm | Self::Disarm { .. } => MavCmd::MAV_CMD_COMPONENT_ARM_DISARM,
             Self::SetMode(_) => MavCmd::MAV_CMD_DO_SET_MODE,
             Self::TakeOff { .. } => MavCmd::MAV_CMD_NAV_TAKEOFF,
+            Self::SetHome => MavCmd::MAV_CMD_DO_SET_HOME,
             Self::SetInterval(_) => MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL,
             Self::Payload(payload) => payload.id,
         }
@@ -324,7 +327,8 @@ impl Command {
         /// ArduPilot's and PX4's word for "even in the air".
         const FORCE: f32 = 21196.0;
         match *self {
-            Self::Arm => [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            // 1: the present place.
+            Self::Arm | Self::SetHome => [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
             Self::Disarm { force } => [0.0, if force { FORCE } else { 0.0 }, 0.0, 0.0, 0.0, 0.0, 0.0],
             // 1: MAV_MODE_FLAG_CUSTOM_MODE_ENABLED.
             Self::SetMode(mode) => [1.0, mode.copter_number() as f32, 0.0, 0.0, 0.0, 0.0, 0.0],

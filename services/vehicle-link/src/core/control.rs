@@ -25,8 +25,8 @@ pub struct Control {
     ours: Option<FlightMode>,
     hands_off: bool,
     since_start: bool,
-    /// The autopilot started again: GUIDED must be *set*, that it is GUIDED hands nothing back.
-    restarted: bool,
+    /// The autopilot started again, or a person flies it in GUIDED: GUIDED must be *set*, that it is GUIDED hands nothing back.
+    must_be_set: bool,
 }
 
 impl Control {
@@ -48,9 +48,10 @@ impl Control {
         self.hands_off && self.since_start
     }
 
-    /// The autopilot started again in flight: whatever mode it comes up in, nobody asked for it now. Hands off until GUIDED is set.
-    pub fn autopilot_restarted(&mut self) {
-        *self = Self { last: self.last, hands_off: true, restarted: true, ..Self::default() };
+    /// Hands off until GUIDED is set, whatever the mode is: the autopilot started again in flight, and nobody asked for the mode that
+    /// it comes up in; or a person's ground station flies it.
+    pub fn let_go(&mut self) {
+        *self = Self { last: self.last, hands_off: true, must_be_set: true, ..Self::default() };
     }
 
     /// Our clock went back.
@@ -79,12 +80,12 @@ impl Control {
             self.ours = Some(mode);
             self.expected = None;
             self.hands_off = false;
-            self.restarted = false;
-        } else if mode == FlightMode::Guided && (changed || !self.restarted) {
+            self.must_be_set = false;
+        } else if mode == FlightMode::Guided && (changed || !self.must_be_set) {
             // Whoever set it: this is how the vehicle is handed back.
             self.hands_off = false;
-            self.restarted = false;
-        } else if self.restarted && armed {
+            self.must_be_set = false;
+        } else if self.must_be_set && armed {
             self.hands_off = true;
         } else if changed {
             // On the ground too, once we had set a mode: setting it again would be a fight.
@@ -97,7 +98,7 @@ impl Control {
         } else if disarmed {
             // The flight is over; so is whoever's turn it was.
             self.hands_off = false;
-            self.restarted = false;
+            self.must_be_set = false;
             self.ours = None;
         }
         if changed && !first {
@@ -190,7 +191,7 @@ mod tests {
         let flying = || {
             let mut control = Control::default();
             control.observe(Guided, true, t(0.0));
-            control.autopilot_restarted();
+            control.let_go();
             assert_eq!(control.observe(Guided, true, t(0.2)), Change::None);
             assert!(control.hands_off() && !control.may_adopt());
             control

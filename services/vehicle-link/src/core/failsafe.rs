@@ -5,6 +5,7 @@
 //! | autopilot silent | sends nothing; the autopilot hovers by itself | it is heard | `a_silent_autopilot_is_sent_nothing_and_taken_up_again` |
 //! | autopilot starts again in flight | hands off, everything under way withdrawn, streams asked for again | GUIDED is set | `an_autopilot_that_starts_again_in_flight_is_left_alone_until_guided_is_set` |
 //! | pilot changes the mode | hands off, commands under way withdrawn | GUIDED is set again | `the_pilot_is_never_fought_and_hands_back_with_guided` |
+//! | a ground station on the relay flies it in GUIDED | the same | the same | `a_ground_station_that_flies_it_in_guided_is_a_pilot` |
 //! | the autopilot's own fail-safe changes it | the same | the same | `the_autopilots_own_fail_safe_is_not_fought_either_and_is_named` |
 //! | estimator or GNSS bad | stops; then asks for LAND | it is good again, before LAND | `a_bad_estimator_stops_then_lands` |
 //! | battery under the land fraction | LAND where it is | disarmed | `battery_low_returns_and_stays_returning_battery_empty_lands_here` |

@@ -29,6 +29,7 @@ pub mod payload;
 pub mod px4;
 pub mod separation;
 pub mod signing;
+pub mod station;
 pub mod streams;
 pub mod surface;
 pub mod telemetry;

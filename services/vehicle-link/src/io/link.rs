@@ -22,6 +22,7 @@ use super::transport::{self, Reader, To, Writer};
 use crate::core::budget::Budget;
 use crate::core::frame::Frame;
 use crate::core::signing::{Signer, Verdict};
+use crate::core::station;
 use crate::core::version::Version;
 use crate::endpoint::Endpoint;
 
@@ -56,6 +57,8 @@ pub enum LinkEvent {
     Unread(MavHeader),
     /// A frame whose signature is not ours; told at most once a second.
     Rejected(Verdict),
+    /// A ground station sends this system something that flies it: [`crate::core::station::flies`].
+    Station(u8, &'static str),
     /// The connection is gone, and why.
     Down(String),
 }
@@ -212,7 +215,12 @@ impl Keeper {
                 }
                 frame = self.relay.next_for_vehicle(), if station_wait_s <= 0.0 => {
                     budget.spend(frame.bytes().len());
-                    let target = frame.message().and_then(|message| message.target_system_id()).unwrap_or(0);
+                    let message = frame.message();
+                    let target = message.as_ref().and_then(|message| message.target_system_id()).unwrap_or(0);
+                    if let Some(what) = message.as_ref().and_then(station::flies) {
+                        // Told before it is sent on, so that no setpoint of ours comes after it. The queue is read all the time.
+                        let _ = self.clock.timeout(WRITE, self.events.send(LinkEvent::Station(target, what))).await;
+                    }
                     Some((frame, if target == 0 { To::All } else { To::System(target) }))
                 }
                 () = self.clock.sleep(Duration::from_secs_f64(station_wait_s.clamp(0.0, 1.0))), if station_wait_s > 0.0 => None,

@@ -10,6 +10,8 @@ use crate::core::interlock;
 /// A vehicle on the ground with a task to land counts as landed within this distance of the place, metres: after a restart of
 /// this service nothing else tells.
 const LANDED_WITHIN_M: f64 = 5.0;
+/// Nearer than this to home, it is there: receivers wander by metres.
+const HOME_WITHIN_M: f64 = 20.0;
 /// The take-off height is at least this much above the ground that it stands on, metres.
 const CLIMB_M_MIN: f64 = 2.5;
 
@@ -64,6 +66,10 @@ impl Executor {
                 self.request(Command::SetMode(FlightMode::Guided), now, outputs);
                 self.set(Activity::Preparing, "setting GUIDED");
             }
+            None if !own.armed && !self.home_fixed && self.is_home(own) => {
+                self.request(Command::SetHome, now, outputs);
+                self.set(Activity::Preparing, "fixing home here");
+            }
             None if !own.armed => {
                 self.request(Command::Arm, now, outputs);
                 self.set(Activity::Preparing, "arming");
@@ -78,6 +84,15 @@ impl Executor {
                 self.set(Activity::TakingOff, format!("to {height_m:.1} m"));
             }
         }
+    }
+
+    /// Whether it stands where it is at home. ArduCopter takes home anew wherever it is armed, unless home was set: one that is armed
+    /// on the water again would return to the water.
+    fn is_home(&self, own: &VehicleState) -> bool {
+        own.home.is_none_or(|home| {
+            let away_m = self.config.frame.ned_from_geodetic(home).xy() - own.position_ned_m.xy();
+            away_m.norm() <= HOME_WITHIN_M
+        })
     }
 
     /// Why it may not take off for `goal` now, if it may not.

@@ -196,6 +196,8 @@ pub struct Executor {
     landing: Landing,
     notes: Vec<Note>,
     withdraw: bool,
+    /// Home was fixed where it first took off, or the autopilot would not.
+    home_fixed: bool,
     ask_streams: bool,
 }
 
@@ -241,6 +243,7 @@ impl Executor {
             landing: Landing::default(),
             notes: Vec::new(),
             withdraw: false,
+            home_fixed: false,
             ask_streams: false,
         }
     }
@@ -339,6 +342,20 @@ impl Executor {
         }
     }
 
+    /// A ground station on our link asked the autopilot for something that moves the vehicle; `what` of [`super::station::flies`]. In
+    /// GUIDED our next setpoint would undo it: that is the pilot's hand on the stick.
+    pub fn observe_station(&mut self, what: &str) {
+        let guided = self.own.as_ref().is_some_and(|own| own.state.mode == FlightMode::Guided && own.state.armed);
+        if !guided || self.control.hands_off() {
+            return;
+        }
+        self.control.let_go();
+        self.withdraw = true;
+        self.pending = None;
+        self.flown = self.goal();
+        self.note(Severity::Warning, "the pilot has the vehicle", format!("a ground station {what}; set GUIDED to hand back"));
+    }
+
     /// The autopilot said something.
     pub fn observe_text(&mut self, text: &str, now: Stamp) {
         if text.to_ascii_lowercase().contains("failsafe") {
@@ -350,6 +367,10 @@ impl Executor {
     pub fn observe_outcome(&mut self, command: &Command, outcome: &Result<(), CommandError>, now: Stamp) {
         self.observe_payload(command, outcome);
         let ours = self.pending.as_ref().is_some_and(|pending| pending.command == *command);
+        if *command == Command::SetHome {
+            // Refused, it is as without: the autopilot takes home where it is armed.
+            self.home_fixed = true;
+        }
         if let (true, Err(error)) = (ours, outcome) {
             self.pending = Some(Pending { command: *command, at: now, refused: true });
             self.detail = error.to_string();
@@ -593,6 +614,7 @@ fn describe(command: &Command) -> String {
         Command::Disarm { force: true } => "termination".into(),
         Command::SetMode(mode) => format!("mode {}", mode_name(*mode)),
         Command::TakeOff { height_above_home_m } => format!("take-off to {height_above_home_m:.1} m"),
+        Command::SetHome => "fixing home".into(),
         Command::SetInterval(stream) => format!("the stream of message {}", stream.message_id),
         Command::Payload(payload) if payload.releases => "releasing the payload".into(),
         Command::Payload(_) => "securing the payload".into(),

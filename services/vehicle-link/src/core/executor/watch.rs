@@ -170,7 +170,7 @@ impl Executor {
 
     fn autopilot_restarted(&mut self) {
         let (severity, what) = if self.airborne {
-            self.control.autopilot_restarted();
+            self.control.let_go();
             self.flown = self.goal();
             (Severity::Critical, "the autopilot started again in flight")
         } else {

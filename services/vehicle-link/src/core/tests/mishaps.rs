@@ -197,6 +197,52 @@ fn an_autopilot_that_starts_again_in_flight_is_left_alone_until_guided_is_set() 
     world.until(60.0, keep, |world| matches!(world.activity(0), Activity::Holding { settled: true }));
 }
 
+#[test]
+fn a_ground_station_that_flies_it_in_guided_is_a_pilot() {
+    let mut world = holding();
+    world.executors[0].observe_station("sends it to a point");
+    world.step();
+    assert!(world.outputs[0].contains(&Output::Withdraw));
+    assert_eq!(noted(&world, Severity::Warning, "the pilot has the vehicle"), 1);
+    world.run(20.0, |world| {
+        keep(world);
+        assert!(
+            world.outputs[0].iter().all(|output| matches!(output, Output::Note(_) | Output::Withdraw)),
+            "no setpoint of ours"
+        );
+        // Its next words are no news.
+        world.executors[0].observe_station("sends targets");
+    });
+    assert_eq!(*world.activity(0), Activity::PilotControl);
+    assert_eq!(noted(&world, Severity::Warning, "the pilot has the vehicle"), 1);
+    world.command(0, VehicleAction::SetMode(FlightMode::Guided));
+    world.until(10.0, keep, |world| matches!(world.activity(0), Activity::Holding { settled: true }));
+}
+
+/// ArduCopter takes home wherever it is armed, unless home was set.
+#[test]
+fn home_is_fixed_before_the_first_arming_and_not_where_it_landed() {
+    let mut world = World::new(&[(0.0, 0.0)]);
+    let mut asked = Vec::new();
+    world.run(20.0, |world| {
+        keep(world);
+        asked.extend(world.outputs[0].iter().filter_map(|output| match output {
+            Output::Request(command @ (Command::SetHome | Command::Arm)) => Some(*command),
+            _ => None,
+        }));
+    });
+    assert_eq!(asked, [Command::SetHome, Command::Arm]);
+    // A service that starts anew beside a vehicle on the water leaves home where it is.
+    let mut world = World::new(&[(60.0, 0.0)]);
+    world.copters[0].home = Vector3::zeros();
+    let mut asked = false;
+    world.run(20.0, |world| {
+        keep(world);
+        asked |= world.outputs[0].contains(&Output::Request(Command::SetHome));
+    });
+    assert!(!asked);
+}
+
 /// What a step back of `back_s`, half a second after it was given, leaves of a permission to descend.
 fn permitted_s(back_s: f64, stands_still: bool, plan_s: f64, clearance_s: f64) -> f64 {
     let mut world = descending_to(4.0, |_| {});

@@ -76,7 +76,7 @@ impl Copter {
             Command::TakeOff { height_above_home_m } if self.armed && self.mode == FlightMode::Guided => {
                 self.climb_to = Some(height_above_home_m - self.home.z);
             }
-            Command::SetInterval(_) => {}
+            Command::SetInterval(_) | Command::SetHome => {}
             Command::Payload(payload) => self.holds_payload = !payload.releases,
             Command::Arm | Command::Disarm { .. } | Command::TakeOff { .. } => return no("failed"),
         }
