@@ -38,6 +38,44 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/formations": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** Who follows whom, and where, by the newest plan. */
+        get: operations["list_formations"];
+        put?: never;
+        /**
+         * Has followers keep a shape about a leader until told otherwise. Slots are given out so that nobody's way crosses another's; the
+         *     same leader again changes its formation. A mission of the leader takes its follower from there.
+         */
+        post: operations["order_formation"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/formations/{id}/disband": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /** Calls the followers of a leader home. */
+        post: operations["disband_formation"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/missions": {
         parameters: {
             query?: never;
@@ -737,6 +775,34 @@ export interface components {
          * @enum {string}
          */
         FixKind: "no_gps" | "no_fix" | "2d" | "3d" | "dgps" | "rtk_float" | "rtk_fixed" | "other";
+        /** @description A formation that is kept. */
+        Formation: {
+            /** @description Who keeps which slot. */
+            followers: {
+                [key: string]: components["schemas"]["SlotOffset"];
+            };
+            /** @description About whom. */
+            leader: string;
+        };
+        /** @description A formation to keep. */
+        FormationRequest: {
+            /** @description Who; none named takes every follower that can be sent. */
+            followers?: string[];
+            /** @description About whom. */
+            leader: string;
+            /** @description In which shape. */
+            shape: components["schemas"]["FormationShape"];
+            /**
+             * Format: double
+             * @description Between neighbours, metres.
+             */
+            spacing_m: number;
+        };
+        /**
+         * @description The shape of a formation.
+         * @enum {string}
+         */
+        FormationShape: "line" | "vee" | "column";
         /**
          * @description What an item's altitude counts from.
          * @enum {string}
@@ -2049,6 +2115,111 @@ export interface operations {
                 };
                 content: {
                     "text/event-stream": components["schemas"]["StreamMessage"];
+                };
+            };
+            /** @description A problem */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    list_formations: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Formation"][];
+                };
+            };
+            /** @description A problem */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    order_formation: {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description Makes a repeat harmless: the same key with the same request gets the first answer again. */
+                "Idempotency-Key"?: string;
+                /** @description Who commands this, for the record. */
+                "Halcyon-Operator"?: string;
+            };
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["FormationRequest"];
+            };
+        };
+        responses: {
+            202: {
+                headers: {
+                    /** @description The formations */
+                    Location?: string;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CommandResult"];
+                };
+            };
+            /** @description A problem */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    disband_formation: {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description Makes a repeat harmless: the same key with the same request gets the first answer again. */
+                "Idempotency-Key"?: string;
+                /** @description Who commands this, for the record. */
+                "Halcyon-Operator"?: string;
+            };
+            path: {
+                /** @description The leader */
+                id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            202: {
+                headers: {
+                    /** @description The formations */
+                    Location?: string;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CommandResult"];
                 };
             };
             /** @description A problem */
