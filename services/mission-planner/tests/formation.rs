@@ -63,7 +63,7 @@ fn followers_take_off_join_and_keep_their_slots_and_a_new_shape_is_the_shorter_w
         let (inner, outer) = (format!("follower-{n}"), format!("follower-{}", n + 1));
         assert!(slot(&world, &inner).unwrap().right_m > slot(&world, &outer).unwrap().right_m);
     }
-    assert!(world.vehicles.iter().all(|vehicle| vehicle.airborne()));
+    assert!(world.vehicles.iter().all(common::FakeVehicle::airborne));
     // The same again changes nothing.
     let generation = world.plan.as_ref().unwrap().assignments.clone();
     world.command(MissionAction::Form(order(Shape::Line, &[])));

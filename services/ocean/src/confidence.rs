@@ -23,9 +23,9 @@ pub fn chi_square_quantile(p: f64, dof: f64) -> f64 {
     for _ in 0..100 {
         let off = gamma_p(half, 0.5 * x) - p;
         if off < 0.0 {
-            low = x
+            low = x;
         } else {
-            high = x
+            high = x;
         }
         let density = (front + (half - 1.0) * x.ln() - 0.5 * x).exp();
         let newton = x - off / density;

@@ -9,6 +9,7 @@ use halcyon_model::{
 use halcyon_vehicle_link::core::executor::{Executor, ExecutorConfig, Output};
 use halcyon_vehicle_link::core::guidance::Guidance;
 use halcyon_vehicle_link::core::limits::{FailSafeLimits, Limits};
+use halcyon_vehicle_link::core::payload::Payload;
 use nalgebra::{UnitQuaternion, Vector3};
 
 fn origin() -> FleetOrigin {
@@ -67,6 +68,7 @@ fn follower() -> Executor {
         fail_safe: FailSafeLimits { fence_radius_m: 1e6, ..FailSafeLimits::default() },
         guidance: Guidance::default(),
         home_height_m: 0.0,
+        payload: Payload::default(),
         frame: origin().frame(),
     })
 }

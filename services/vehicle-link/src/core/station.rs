@@ -7,6 +7,7 @@ use mavlink::dialects::ardupilotmega::{MavCmd, MavMessage};
 /// What the message asks for, in words, if it moves the vehicle; `None` for everything else. Changes of mode are seen in the
 /// heartbeat, arming is nobody's flight yet, and a joystick that lies on the table speaks all the time, and flies nothing in GUIDED.
 #[must_use]
+#[allow(deprecated, reason = "Mission Planner still sends MISSION_ITEM")]
 pub fn flies(message: &MavMessage) -> Option<&'static str> {
     match message {
         MavMessage::SET_POSITION_TARGET_LOCAL_NED(_) | MavMessage::SET_POSITION_TARGET_GLOBAL_INT(_) => Some("sends targets"),
@@ -56,6 +57,7 @@ mod tests {
     }
 
     #[test]
+    #[allow(deprecated, reason = "Mission Planner still sends MISSION_ITEM")]
     fn whatever_moves_it_in_guided_does() {
         let moves = [
             MavMessage::SET_POSITION_TARGET_GLOBAL_INT(ardu::SET_POSITION_TARGET_GLOBAL_INT_DATA::default()),

@@ -12,7 +12,7 @@ use std::time::Duration;
 use halcyon_chassis::Clock;
 use halcyon_model::Stamp;
 use mavlink::dialects::ardupilotmega::MavMessage;
-use mavlink::{MavHeader, MavlinkVersion, Message as _};
+use mavlink::{MavHeader, MavlinkVersion};
 use tokio::sync::mpsc;
 use tokio_util::sync::CancellationToken;
 use tracing::debug;
@@ -216,7 +216,7 @@ impl Keeper {
                 frame = self.relay.next_for_vehicle(), if station_wait_s <= 0.0 => {
                     budget.spend(frame.bytes().len());
                     let message = frame.message();
-                    let target = message.as_ref().and_then(|message| message.target_system_id()).unwrap_or(0);
+                    let target = message.as_ref().and_then(mavlink::Message::target_system_id).unwrap_or(0);
                     if let Some(what) = message.as_ref().and_then(station::flies) {
                         // Told before it is sent on, so that no setpoint of ours comes after it. The queue is read all the time.
                         let _ = self.clock.timeout(WRITE, self.events.send(LinkEvent::Station(target, what))).await;

@@ -53,7 +53,7 @@ impl Bench {
     fn carry_out(&mut self, effects: Vec<Effect>) {
         for effect in effects {
             match effect {
-                Effect::Send(message) if !self.cut => self.up.send(message, self.now_s, &mut self.dice),
+                Effect::Send(message) if !self.cut => self.up.send(&message, self.now_s, &mut self.dice),
                 Effect::Transferred(ticket, ending) => self.endings.push((ticket, ending)),
                 Effect::Send(_) | Effect::Done(..) => {}
             }
@@ -68,7 +68,7 @@ impl Bench {
         }
         self.script.step(self.now_s);
         for message in self.script.answers() {
-            self.down.send(message, self.now_s, &mut self.dice);
+            self.down.send(&message, self.now_s, &mut self.dice);
         }
         for message in self.down.arrived(self.now_s) {
             if self.transfers.observe(&message, (7, 191), t(self.now_s)) {
@@ -76,7 +76,7 @@ impl Bench {
                 self.carry_out(effects);
             }
         }
-        if tick % 10 == 0 {
+        if tick.is_multiple_of(10) {
             let effects = self.transfers.poll(to(), t(self.now_s));
             self.carry_out(effects);
         }
@@ -110,7 +110,7 @@ fn items(kind: ItemKind, count: usize) -> Vec<Item> {
         latitude_deg: Some(53.0 + at as f64 / 1024.0),
         longitude_deg: if at % 7 == 6 { None } else { Some(-2.5 - at as f64 / 512.0) },
         altitude_m: Some(5.25 + at as f64),
-        autocontinue: at % 2 == 0,
+        autocontinue: at.is_multiple_of(2),
     };
     (0..count).map(item).collect()
 }

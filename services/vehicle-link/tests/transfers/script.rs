@@ -36,7 +36,7 @@ impl Wire {
         Self { loss, repeats, delay_s_max, on_the_way: Vec::new() }
     }
 
-    pub(crate) fn send(&mut self, message: MavMessage, now_s: f64, dice: &mut Dice) {
+    pub(crate) fn send(&mut self, message: &MavMessage, now_s: f64, dice: &mut Dice) {
         let copies = if dice.roll() < self.repeats { 2 } else { 1 };
         for _ in 0..copies {
             if dice.roll() >= self.loss {

@@ -19,7 +19,7 @@ const LAG_S_MIN: f64 = 2.0;
 /// independent waves that the window is worth. `None` without data.
 pub(crate) fn degrees_of_freedom(series: &Series, interval_s: f64, period_s: Option<f64>) -> Option<f64> {
     let (table, length) = table(series, interval_s);
-    let used: Vec<Gauge> = table.into_iter().flatten().map(Gauge::of).collect();
+    let used: Vec<Gauge> = table.into_iter().flatten().map(|elevation_m| Gauge::of(&elevation_m)).collect();
     let gauges = used.len() as f64;
     let duration_s = length as f64 * interval_s;
     let lag_s = (LAG_PERIODS * period_s.unwrap_or(0.0)).max(LAG_S_MIN).min(duration_s / 3.0);
@@ -71,7 +71,7 @@ struct Gauge {
 }
 
 impl Gauge {
-    fn of(elevation_m: Vec<f64>) -> Self {
+    fn of(elevation_m: &[f64]) -> Self {
         let known = elevation_m.iter().map(|x| f64::from(u8::from(!x.is_nan()))).collect();
         Self { elevation_m: elevation_m.iter().map(|x| if x.is_nan() { 0.0 } else { *x }).collect(), known }
     }
