@@ -123,6 +123,12 @@ impl Track {
         now.seconds_since(self.state.stamp).max(now.seconds_since(self.received)).max(0.0)
     }
 
+    /// What is taken out of the place that it says, metres.
+    #[must_use]
+    pub fn leap_ned_m(&self) -> Vector3<f64> {
+        self.continuity.shift_ned_m()
+    }
+
     /// Where it was at its stamp, metres; without leaps of its receiver.
     #[must_use]
     pub fn place_ned_m(&self) -> Vector3<f64> {

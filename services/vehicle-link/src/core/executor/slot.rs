@@ -139,11 +139,11 @@ impl Executor {
             let closer_m = self.planned_apart_m(id).map_or(0.0, |apart_m| (usual_m - (apart_m - limits.slot_slack_m)).max(0.0));
             let here = separation::obstacle(track, follows, limits, now);
             let onward = separation::onward(track, follows, limits, now);
-            // One whose position has just jumped may be at either place.
-            let before = here.as_ref().and_then(|here| self.before_jump(id, here, now));
+            // One whose position has jumped may be at either place.
+            let elsewhere = here.as_ref().and_then(|here| self.elsewhere(id, track, here, now));
             here.into_iter()
                 .chain(onward)
-                .chain(before)
+                .chain(elsewhere)
                 .map(move |obstacle| Obstacle { keep_m: obstacle.keep_m - closer_m, ..obstacle })
         };
         self.neighbours.iter().flat_map(near).collect()

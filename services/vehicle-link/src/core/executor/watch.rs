@@ -277,10 +277,12 @@ impl Executor {
         (now < until).then_some(by_m)
     }
 
-    /// The same obstacle where it would be if it hadn't jumped.
-    pub(super) fn before_jump(&self, vehicle: &VehicleId, obstacle: &Obstacle, now: Stamp) -> Option<Obstacle> {
-        let by_m = self.other_jumped_m(vehicle, now)?;
-        Some(Obstacle { position_ned_m: obstacle.position_ned_m - by_m, ..*obstacle })
+    /// The same obstacle at the other place where it may be: where it says that it is, while a leap is taken out of its place; else
+    /// where it would be if it hadn't jumped.
+    pub(super) fn elsewhere(&self, vehicle: &VehicleId, track: &Track, obstacle: &Obstacle, now: Stamp) -> Option<Obstacle> {
+        let leap_m = track.leap_ned_m();
+        let off_m = if leap_m.norm() > 0.0 { leap_m } else { -self.other_jumped_m(vehicle, now)? };
+        Some(Obstacle { position_ned_m: obstacle.position_ned_m + off_m, ..*obstacle })
     }
 
     /// A state under our own name: our own voice, or another vehicle's?

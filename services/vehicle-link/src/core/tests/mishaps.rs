@@ -171,6 +171,21 @@ fn a_neighbour_that_jumped_is_kept_clear_of_where_it_was() {
     assert!(world.least_m >= 5.0, "{}", world.least_m);
 }
 
+/// The same, but what it says after the jump is true: its receiver has come back. The way leads through that place for long.
+#[test]
+fn a_neighbour_that_jumped_is_kept_clear_of_where_it_says_that_it_is() {
+    let mut world = World::new(&[(0.0, 0.0), (0.0, -8.0)]);
+    world.airborne(0, Vector3::new(40.0, 0.0, -5.0));
+    world.airborne(1, Vector3::new(40.0, -30.0, -5.0));
+    world.copters[0].off = Vector3::new(12.0, 0.0, 0.0);
+    world.copters[0].mode = FlightMode::Loiter;
+    let plan = |world: &mut World| drop(world.plan(&[(0, survey(40.0, 0.0)), (1, survey(40.0, 30.0))], 5.0));
+    world.until(30.0, plan, |world| (world.copters[0].position - world.copters[1].position).norm() < 12.0);
+    world.copters[0].off = Vector3::zeros();
+    world.run(40.0, plan);
+    assert!(world.least_m >= 5.0, "{}", world.least_m);
+}
+
 #[test]
 fn an_autopilot_that_starts_again_in_flight_is_left_alone_until_guided_is_set() {
     let mut world = holding();
