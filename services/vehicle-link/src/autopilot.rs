@@ -310,7 +310,8 @@ impl Autopilot {
     #[must_use]
     pub fn setpoint(&self, setpoint: &Setpoint, now: Stamp) -> Option<MavMessage> {
         let boot_ms = (now.seconds_since(self.started) * 1e3) as u64 as u32;
-        encode::setpoint(setpoint, &self.datum, self.local.shift_ned_m(now), self.address?, boot_ms)
+        let prefers_local = self.identity.family() == Family::Px4;
+        encode::setpoint(setpoint, &self.datum, self.local.shift_ned_m(now), prefers_local, self.address?, boot_ms)
     }
 
     /// Our header: same system as the vehicle, as its onboard computer.

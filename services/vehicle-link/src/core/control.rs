@@ -41,6 +41,12 @@ impl Control {
         self.hands_off
     }
 
+    /// Whether this mode was asked for by us, and has been in force since.
+    #[must_use]
+    pub fn is_ours(&self, mode: FlightMode) -> bool {
+        self.ours == Some(mode) && self.last.is_some_and(|last| last.0 == mode)
+    }
+
     /// Whether the hands have been off since the first thing that was heard: then the mode may be what our predecessor, before a
     /// restart, had asked for.
     #[must_use]

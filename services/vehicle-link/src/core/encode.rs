@@ -7,6 +7,10 @@ use nalgebra::Vector3;
 
 use super::guidance::Setpoint;
 
+const NO_ACCELERATION: Mask = Mask::POSITION_TARGET_TYPEMASK_AX_IGNORE
+    .union(Mask::POSITION_TARGET_TYPEMASK_AY_IGNORE)
+    .union(Mask::POSITION_TARGET_TYPEMASK_AZ_IGNORE);
+
 /// Who is addressed; never system 0, which is everybody.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Address {
@@ -43,14 +47,16 @@ pub struct Datum {
     pub home_height_m: f64,
 }
 
-/// A setpoint for one vehicle. With an acceleration, and where the autopilot's local frame is known (`local_shift_ned_m`, of
-/// [`super::local`]), it goes as SET_POSITION_TARGET_LOCAL_NED, the only form in which ArduCopter takes the three together; else as
-/// SET_POSITION_TARGET_GLOBAL_INT without the acceleration. `None` if a number is not finite: such a setpoint is never sent.
+/// A setpoint for one vehicle. With an acceleration, or for an autopilot that takes local places better (`prefers_local`), it goes as
+/// SET_POSITION_TARGET_LOCAL_NED where the autopilot's local frame is known (`local_shift_ned_m`, of [`super::local`]): the only form in
+/// which ArduCopter takes place, velocity and acceleration together. Else as SET_POSITION_TARGET_GLOBAL_INT without the acceleration.
+/// `None` if a number is not finite: such a setpoint is never sent.
 #[must_use]
 pub fn setpoint(
     setpoint: &Setpoint,
     datum: &Datum,
     local_shift_ned_m: Option<Vector3<f64>>,
+    prefers_local: bool,
     to: Address,
     boot_ms: u32,
 ) -> Option<MavMessage> {
@@ -59,19 +65,22 @@ pub fn setpoint(
     if !finite(position_ned_m) || !finite(velocity_ned_mps) || heading_rad.is_some_and(|heading| !heading.is_finite()) {
         return None;
     }
-    match acceleration_ned_mps2.zip(local_shift_ned_m) {
-        Some((acceleration_ned_mps2, _)) if !finite(acceleration_ned_mps2) => None,
-        Some((acceleration_ned_mps2, shift_ned_m)) => {
-            Some(local(position_ned_m + shift_ned_m, velocity_ned_mps, acceleration_ned_mps2, heading_rad, to, boot_ms))
+    if acceleration_ned_mps2.is_some_and(|acceleration| !finite(acceleration)) {
+        return None;
+    }
+    match local_shift_ned_m {
+        Some(shift_ned_m) if prefers_local || acceleration_ned_mps2.is_some() => {
+            let place_m = position_ned_m + shift_ned_m;
+            finite(place_m).then(|| local(place_m, velocity_ned_mps, acceleration_ned_mps2, heading_rad, to, boot_ms))
         }
-        None => Some(global(setpoint, datum, to, boot_ms)),
+        _ => Some(global(setpoint, datum, to, boot_ms)),
     }
 }
 
 fn local(
     place_m: Vector3<f64>,
     velocity_mps: Vector3<f64>,
-    acceleration_mps2: Vector3<f64>,
+    acceleration_mps2: Option<Vector3<f64>>,
     heading_rad: Option<f64>,
     to: Address,
     boot_ms: u32,
@@ -80,6 +89,10 @@ fn local(
     if heading_rad.is_none() {
         mask |= Mask::POSITION_TARGET_TYPEMASK_YAW_IGNORE;
     }
+    if acceleration_mps2.is_none() {
+        mask |= NO_ACCELERATION;
+    }
+    let acceleration_mps2 = acceleration_mps2.unwrap_or_default();
     MavMessage::SET_POSITION_TARGET_LOCAL_NED(ardu::SET_POSITION_TARGET_LOCAL_NED_DATA {
         time_boot_ms: boot_ms,
         x: place_m.x as f32,
@@ -105,10 +118,7 @@ fn local(
 fn global(setpoint: &Setpoint, datum: &Datum, to: Address, boot_ms: u32) -> MavMessage {
     let Setpoint { position_ned_m, velocity_ned_mps, heading_rad, .. } = *setpoint;
     let position = datum.frame.geodetic_from_ned(position_ned_m);
-    let mut mask = Mask::POSITION_TARGET_TYPEMASK_AX_IGNORE
-        | Mask::POSITION_TARGET_TYPEMASK_AY_IGNORE
-        | Mask::POSITION_TARGET_TYPEMASK_AZ_IGNORE
-        | Mask::POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE;
+    let mut mask = NO_ACCELERATION | Mask::POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE;
     if heading_rad.is_none() {
         mask |= Mask::POSITION_TARGET_TYPEMASK_YAW_IGNORE;
     }
@@ -150,7 +160,7 @@ mod tests {
 
     fn sent(asked: &Setpoint, shift_ned_m: Option<Vector3<f64>>) -> Option<MavMessage> {
         let datum = Datum { frame: FleetOrigin(Geodetic::from_deg(53.1, -2.9, 40.0)).frame(), home_height_m: 1.0 };
-        setpoint(asked, &datum, shift_ned_m, Address::new(7, 1)?, 1234)
+        setpoint(asked, &datum, shift_ned_m, false, Address::new(7, 1)?, 1234)
     }
 
     fn asked() -> Setpoint {
@@ -184,6 +194,20 @@ mod tests {
             let Some(MavMessage::SET_POSITION_TARGET_GLOBAL_INT(data)) = sent(&asked, shift) else { panic!("not global") };
             assert_eq!((data.type_mask.bits(), data.alt), (2048 + 64 + 128 + 256, 5.0));
         }
+    }
+
+    #[test]
+    fn where_local_places_are_taken_better_all_go_there_without_an_acceleration_too() {
+        let datum = Datum { frame: FleetOrigin(Geodetic::from_deg(53.1, -2.9, 40.0)).frame(), home_height_m: 1.0 };
+        let asked = Setpoint { acceleration_ned_mps2: None, ..asked() };
+        let to = Address::new(7, 1).unwrap();
+        let Some(MavMessage::SET_POSITION_TARGET_LOCAL_NED(data)) =
+            setpoint(&asked, &datum, Some(Vector3::new(4.0, -3.0, 1.5)), true, to, 0)
+        else {
+            panic!("not local")
+        };
+        assert_eq!((data.type_mask.bits(), data.x, data.y, data.z), (2048 + 64 + 128 + 256, 14.0, 17.0, -4.5));
+        assert!(matches!(setpoint(&asked, &datum, None, true, to, 0), Some(MavMessage::SET_POSITION_TARGET_GLOBAL_INT(_))));
     }
 
     #[test]

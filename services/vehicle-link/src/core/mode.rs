@@ -17,6 +17,11 @@ pub enum Family {
     Px4,
 }
 
+/// What PX4 calls itself in [`Firmware`].
+const PX4_NAME: &str = "PX4";
+/// PX4's AUTO.TAKEOFF, which no mode of ours is like.
+pub const PX4_TAKE_OFF: FlightMode = FlightMode::Other(2 << 24 | 4 << 16);
+
 /// PX4's modes by main and sub mode (`px4_custom_mode.h`), the preferred one of each of ours first.
 const PX4: [(FlightMode, u32, u32); 10] = [
     (FlightMode::Guided, 6, 0),
@@ -38,6 +43,30 @@ impl Family {
     #[must_use]
     pub fn of(heartbeat: &HEARTBEAT_DATA) -> Self {
         if heartbeat.autopilot == MavAutopilot::MAV_AUTOPILOT_PX4 { Self::Px4 } else { Self::ArduPilot }
+    }
+
+    /// By what is known of the firmware; nothing known is ArduPilot.
+    #[must_use]
+    pub fn named(firmware: Option<&Firmware>) -> Self {
+        if firmware.is_some_and(|firmware| firmware.autopilot == PX4_NAME) { Self::Px4 } else { Self::ArduPilot }
+    }
+
+    /// The mode in which it is armed and told to take off: PX4's OFFBOARD would have to be fed already on the ground.
+    #[must_use]
+    pub fn take_off_from(self) -> FlightMode {
+        match self {
+            Self::ArduPilot => FlightMode::Guided,
+            Self::Px4 => FlightMode::Loiter,
+        }
+    }
+
+    /// The mode in which it climbs after NAV_TAKEOFF.
+    #[must_use]
+    pub fn climbs_in(self) -> FlightMode {
+        match self {
+            Self::ArduPilot => FlightMode::Guided,
+            Self::Px4 => PX4_TAKE_OFF,
+        }
     }
 
     /// From `custom_mode`.
@@ -78,7 +107,7 @@ fn px4_number(main: u32, sub: u32) -> u32 {
 pub fn firmware(heartbeat: &HEARTBEAT_DATA) -> Firmware {
     let autopilot = match heartbeat.autopilot {
         MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA => "ArduPilot".to_owned(),
-        MavAutopilot::MAV_AUTOPILOT_PX4 => "PX4".to_owned(),
+        MavAutopilot::MAV_AUTOPILOT_PX4 => PX4_NAME.to_owned(),
         other => plain(&format!("{other:?}"), "MAV_AUTOPILOT_"),
     };
     Firmware { autopilot, vehicle: plain(&format!("{:?}", heartbeat.mavtype), "MAV_TYPE_"), version: String::new() }
@@ -138,7 +167,7 @@ mod tests {
         check(0x0003_0000, FlightMode::PosHold);
         check(0x0002_0000, FlightMode::AltHold);
         check(0x0007_0000, FlightMode::Stabilize);
-        check(0x0204_0000, FlightMode::Other(0x0204_0000));
+        check(0x0204_0000, PX4_TAKE_OFF);
         check(4, FlightMode::Other(4));
         assert_eq!(Family::ArduPilot.mode(4), FlightMode::Guided);
     }
@@ -166,6 +195,9 @@ mod tests {
         let firmware = firmware(&heartbeat);
         assert_eq!((firmware.autopilot.as_str(), firmware.vehicle.as_str()), ("ArduPilot", "ground rover"));
         assert!(!is_copter(heartbeat.mavtype) && is_copter(MavType::MAV_TYPE_HEXAROTOR));
+        assert_eq!(Family::named(Some(&firmware)), Family::ArduPilot);
+        let px4 = super::firmware(&HEARTBEAT_DATA { autopilot: MavAutopilot::MAV_AUTOPILOT_PX4, ..heartbeat });
+        assert_eq!((Family::named(Some(&px4)), Family::named(None)), (Family::Px4, Family::ArduPilot));
         assert_eq!(version(0x0406_00FF), "4.6.0");
         assert_eq!(version(0x010F_0140), "1.15.1-alpha");
         assert_eq!(version(0x0405_07C0), "4.5.7-rc");

@@ -3,15 +3,20 @@
 //! - Modes have a main and a sub number ([`super::mode`]).
 //! - NAV_TAKEOFF's altitude is above mean sea level, and zeros for the place are a place: off the coast of Ghana.
 //! - OFFBOARD, its GUIDED, is refused unless setpoints stream already: so a request for it waits for a second, while the vehicle's own
-//!   place is streamed as the setpoint.
+//!   place is streamed as the setpoint. It doesn't hold by itself in OFFBOARD, either: a second without a setpoint is a fail-safe.
+//! - It is armed in HOLD and takes off in a mode of its own, AUTO.TAKEOFF.
+//! - Setpoints go in its local frame whenever that is known: what SET_POSITION_TARGET_GLOBAL_INT means changed between its versions
+//!   (1.12 took a height above home with the wrong sign of home's own).
 //!
-//! After its take-off PX4 is in HOLD by itself. That looks like a pilot's choice, and so waits for a person to hand the vehicle back.
+//! # Modes that it changes by itself
+//! After a take-off it is in HOLD, and when the motors stop after LAND it is back in the mode before. Neither is a pilot's choice, if the
+//! take-off or the landing was ours: [`TakeOff`] and [`is_back_after_landing`] tell.
 
-use halcyon_model::{FlightMode, Stamp};
+use halcyon_model::{FlightMode, Stamp, VehicleState};
 use mavlink::dialects::ardupilotmega::{MavCmd, MavMessage};
 
 use super::commands::{Command, CommandError, Effect, Ticket};
-use super::mode::Family;
+use super::mode::{Family, PX4_TAKE_OFF};
 
 /// Setpoints stream for so long before OFFBOARD is asked for, seconds; PX4 looks back by half of that.
 const LEAD_S: f64 = 1.0;
@@ -19,6 +24,9 @@ const LEAD_S: f64 = 1.0;
 const STREAM_S_MAX: f64 = 8.0;
 /// Requests that wait at once.
 const WAITING_MAX: usize = 8;
+/// A take-off ends no further below its height than this, metres: PX4 is content within 0.8 (NAV_MC_ALT_RAD), and its height may be heard
+/// a little later than its mode. Lower than that, HOLD is the pilot's.
+const END_M: f64 = 1.5;
 
 /// A command as PX4 takes it. `home_amsl_m`: altitude of home above mean sea level; a take-off without it can't be sent.
 #[must_use]
@@ -37,6 +45,40 @@ pub fn fitted(message: MavMessage, home_amsl_m: Option<f64>) -> Option<MavMessag
         _ => {}
     }
     Some(MavMessage::COMMAND_LONG(data))
+}
+
+/// A take-off of ours, from the request to the HOLD at its end.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct TakeOff {
+    /// Above mean water, metres.
+    height_m: Option<f64>,
+    is_accepted: bool,
+}
+
+impl TakeOff {
+    /// It is asked for, to a height above mean water, metres.
+    pub fn asked(&mut self, height_m: f64) {
+        self.height_m = Some(height_m);
+    }
+
+    /// PX4 answered. A request again that goes unanswered takes back nothing.
+    pub fn answered(&mut self, is_accepted: bool) {
+        self.is_accepted |= is_accepted;
+    }
+
+    /// Whether this change of mode is its end, rather than a pilot's choice.
+    #[must_use]
+    pub fn ends(&self, before: &VehicleState, now: &VehicleState) -> bool {
+        let is_up = self.height_m.is_some_and(|height_m| -now.position_ned_m.z >= height_m - END_M);
+        self.is_accepted && is_up && now.armed && before.mode == PX4_TAKE_OFF && now.mode == FlightMode::Loiter
+    }
+}
+
+/// Whether PX4 is back in HOLD because it stopped the motors itself, after a landing or a take-off that came to nothing.
+#[must_use]
+pub fn is_back_after_landing(before: &VehicleState, now: &VehicleState) -> bool {
+    let was_auto = matches!(before.mode, FlightMode::Land | FlightMode::Rtl) || before.mode == PX4_TAKE_OFF;
+    before.armed && !now.armed && was_auto && now.mode == FlightMode::Loiter
 }
 
 /// Requests for OFFBOARD.

@@ -7,6 +7,7 @@ use halcyon_model::{
 use super::{Direct, Executor, Goal};
 use crate::core::commands::Command;
 use crate::core::interlock::{self, mode_name};
+use crate::core::mode::Family;
 use crate::core::transfers::Request;
 
 /// What becomes of a direct command.
@@ -157,7 +158,11 @@ impl Executor {
         if own.armed {
             return Ok(Decision::Accepted("armed already".into()));
         }
-        let _ = now;
+        let mode = Family::named(own.firmware.as_ref()).take_off_from();
+        if mode != FlightMode::Guided && own.mode == mode {
+            // PX4 in HOLD, which is then ours, so that a take-off may follow.
+            self.control.expect(mode, now);
+        }
         // The autopilot's own checks decide, and say why not.
         Ok(Decision::Ask(Command::Arm))
     }

@@ -108,6 +108,7 @@ impl Executor {
     /// Home, and down.
     pub(super) fn go_home(&mut self, step: &mut Step) {
         let Some(home) = self.home(step.own) else {
+            self.hold(None, step);
             self.request(Command::SetMode(FlightMode::Rtl), step.now, step.outputs);
             return self.set(Activity::Returning, "home unknown here: the autopilot's own RTL");
         };

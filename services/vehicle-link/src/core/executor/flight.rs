@@ -9,6 +9,7 @@ use crate::core::failsafe::{Action, Alarm, Cause, Conditions, PlanHealth};
 use crate::core::guidance::{PLACE_GAIN_HZ, Reference, SLOT_GAIN_HZ, Setpoint, Target, limit_velocity};
 use crate::core::interlock::{self, FollowRefusal};
 use crate::core::inverse::Inverse;
+use crate::core::mode::Family;
 use crate::core::separation;
 
 /// The autopilot's own climb is waited for so long, seconds; then guidance takes over.
@@ -54,8 +55,11 @@ pub(super) fn at(point: LocalPoint, height_m: f64) -> Vector3<f64> {
 impl Executor {
     /// One step in the air, with the vehicle ours.
     pub(super) fn fly(&mut self, own: &VehicleState, goal: Option<Goal>, dt_s: f64, now: Stamp, outputs: &mut Vec<Output>) {
+        let family = Family::named(own.firmware.as_ref());
         let goal = match goal {
             Some(goal) => goal,
+            // Without setpoints it wouldn't stay.
+            None if family == Family::Px4 && own.mode == FlightMode::Guided => Goal::Stay,
             None if self.plan_health(now) == PlanHealth::Lapsed => Goal::Stay,
             None if self.restarted_at.is_some() => {
                 return self.set(Activity::Holding { settled: false }, "restarted in flight, waiting for a plan");
@@ -67,8 +71,11 @@ impl Executor {
         let age_s = now.seconds_since(own.stamp).clamp(0.0, 0.5);
         let here_ned_m = own.position_ned_m + own.velocity_ned_mps * age_s;
         let land_now = alarm.as_ref().is_some_and(|alarm| alarm.action == Action::Land);
-        if let Some(climb) = self.climb.filter(|_| own.mode == FlightMode::Guided && !land_now) {
-            let arrived = -here_ned_m.z >= climb.height_m - 0.5 && own.velocity_ned_mps.z.abs() < CLIMBED_MPS;
+        if let Some(climb) = self.climb.filter(|_| own.mode == family.climbs_in() && !land_now) {
+            // PX4 says by its mode that it has arrived.
+            let arrived = own.mode == FlightMode::Guided
+                && -here_ned_m.z >= climb.height_m - 0.5
+                && own.velocity_ned_mps.z.abs() < CLIMBED_MPS;
             if !arrived && now.seconds_since(climb.since) < CLIMB_S_MAX {
                 // A setpoint now would end the autopilot's own take-off.
                 return self.set(Activity::TakingOff, format!("to {:.1} m", climb.height_m));
@@ -102,7 +109,9 @@ impl Executor {
             FlightMode::Guided => self.guide(&effective, &mut step),
             FlightMode::Land => self.in_land_mode(&effective, &mut step),
             // Ours only on the way home without a known home.
-            _ if effective == Goal::Return => self.set(Activity::Returning, "by the autopilot's own RTL"),
+            FlightMode::Rtl if effective == Goal::Return => self.set(Activity::Returning, "by the autopilot's own RTL"),
+            // PX4 after its take-off, or a mode that something else was asked for in.
+            _ if effective == Goal::LandHere => self.land_here(&mut step),
             _ => self.request(Command::SetMode(FlightMode::Guided), now, step.outputs),
         }
         if let Some(alarm) = alarm {
@@ -162,11 +171,17 @@ impl Executor {
                 self.land(*point, *approach_height_m, clearance.as_ref(), step);
             }
             Goal::LandHere => {
-                self.request(Command::SetMode(FlightMode::Land), step.now, step.outputs);
-                self.set(Activity::Descending, "landing here");
+                // Until it is in LAND it must be told where to be.
+                self.hold(None, step);
+                self.land_here(step);
             }
             Goal::Return => self.go_home(step),
         }
+    }
+
+    fn land_here(&mut self, step: &mut Step) {
+        self.request(Command::SetMode(FlightMode::Land), step.now, step.outputs);
+        self.set(Activity::Descending, "landing here");
     }
 
     /// Stops and holds; returns whether settled. Below the safe height it climbs to it.

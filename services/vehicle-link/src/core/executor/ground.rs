@@ -6,6 +6,8 @@ use super::{Climb, Executor, Goal, Output};
 use crate::core::commands::Command;
 use crate::core::failsafe::{FailSafes, PlanHealth};
 use crate::core::interlock;
+use crate::core::mode::{Family, PX4_TAKE_OFF};
+use crate::core::px4::TakeOff;
 
 /// A vehicle on the ground with a task to land counts as landed within this distance of the place, metres: after a restart of
 /// this service nothing else tells.
@@ -28,6 +30,7 @@ impl Executor {
         }
         self.landed_for_goal = true;
         self.restarted_at = None;
+        self.take_off = TakeOff::default();
         self.fail_safes = FailSafes::default();
         self.watch_over();
         self.let_go();
@@ -62,9 +65,10 @@ impl Executor {
                 }
                 self.set(Activity::Preparing, reason);
             }
-            None if own.mode != FlightMode::Guided => {
-                self.request(Command::SetMode(FlightMode::Guided), now, outputs);
-                self.set(Activity::Preparing, "setting GUIDED");
+            None if !self.may_take_off_in(own) => {
+                let mode = Family::named(own.firmware.as_ref()).take_off_from();
+                self.request(Command::SetMode(mode), now, outputs);
+                self.set(Activity::Preparing, format!("setting {}", interlock::mode_name(mode)));
             }
             None if !own.armed && !self.home_fixed && self.is_home(own) => {
                 self.request(Command::SetHome, now, outputs);
@@ -78,10 +82,27 @@ impl Executor {
                 let ground_m = -own.position_ned_m.z;
                 let height_m = self.config.limits.safe_height_m.max(ground_m + CLIMB_M_MIN);
                 let height_above_home_m = height_m - self.config.home_height_m;
+                let before = outputs.len();
                 self.request(Command::TakeOff { height_above_home_m }, now, outputs);
+                if outputs.len() > before && Family::named(own.firmware.as_ref()) == Family::Px4 {
+                    self.control.expect(PX4_TAKE_OFF, now);
+                    self.take_off.asked(height_m);
+                }
                 self.climb = Some(Climb { height_m, since: now });
                 self.flown = None;
                 self.set(Activity::TakingOff, format!("to {height_m:.1} m"));
+            }
+        }
+    }
+
+    /// Whether it may be armed and told to take off in its present mode. PX4's HOLD is anybody's: only once we have asked for it, it is
+    /// ours, and so is its AUTO.TAKEOFF until it leaves the ground.
+    fn may_take_off_in(&self, own: &VehicleState) -> bool {
+        match Family::named(own.firmware.as_ref()) {
+            Family::ArduPilot => own.mode == FlightMode::Guided,
+            Family::Px4 => {
+                let ready = own.mode == Family::Px4.take_off_from() || (own.armed && own.mode == PX4_TAKE_OFF);
+                ready && self.control.is_ours(own.mode)
             }
         }
     }

@@ -10,7 +10,7 @@
 //! 4. The plan. A newer one without this vehicle leaves it what it was doing, and no longer lapses for it.
 //!
 //! # After a restart in flight
-//! Nothing is sent until the first plan or command (the autopilot holds by itself in GUIDED); with none within
+//! Nothing is sent until the first plan or command (ArduCopter holds by itself in GUIDED; PX4 in OFFBOARD is told to); with none within
 //! [`RESTART_GRACE_S`], the fail-safe of a lapsed plan follows: hold, then return. A LAND or RTL that was under way is taken for
 //! our own if the plan asks for just that, else left alone.
 //!
@@ -49,7 +49,9 @@ use super::guidance::{Guidance, Reference, Setpoint};
 use super::interlock::mode_name;
 use super::inverse::Inverse;
 use super::limits::{FailSafeLimits, Limits};
+use super::mode::Family;
 use super::payload::Payload;
+use super::px4;
 use super::track::Track;
 use descent::Landing;
 use payload::Release;
@@ -162,6 +164,8 @@ pub struct Executor {
     restarted_at: Option<Stamp>,
     pending: Option<Pending>,
     climb: Option<Climb>,
+    /// PX4's way up; ArduCopter stays in GUIDED.
+    take_off: px4::TakeOff,
     /// The goal of this flight or the last: not taken off for again.
     flown: Option<Goal>,
     airborne: bool,
@@ -217,6 +221,7 @@ impl Executor {
             restarted_at: None,
             pending: None,
             climb: None,
+            take_off: px4::TakeOff::default(),
             flown: None,
             airborne: false,
             reference: None,
@@ -310,11 +315,15 @@ impl Executor {
         self.watch_self(&state, now);
         self.landing.surface.observe(&state);
         let first = self.own.is_none();
+        if self.is_autopilots_own_change(&state) {
+            self.control.expect(state.mode, now);
+        }
         match self.control.observe(state.mode, state.armed, now) {
             Change::None => {}
             Change::TakenOver => {
                 self.withdraw = true;
                 self.pending = None;
+                self.take_off = px4::TakeOff::default();
                 // Once the pilot had it, it doesn't take off by itself for the same task again.
                 self.flown = self.goal();
                 let mode = mode_name(state.mode);
@@ -342,6 +351,15 @@ impl Executor {
         }
     }
 
+    /// Whether PX4 changed its mode by itself, at the end of what we had asked for.
+    fn is_autopilots_own_change(&self, state: &VehicleState) -> bool {
+        let Some(before) = self.own.as_ref().map(|own| &own.state).filter(|before| self.control.is_ours(before.mode)) else {
+            return false;
+        };
+        Family::named(state.firmware.as_ref()) == Family::Px4
+            && (self.take_off.ends(before, state) || px4::is_back_after_landing(before, state))
+    }
+
     /// A ground station on our link asked the autopilot for something that moves the vehicle; `what` of [`super::station::flies`]. In
     /// GUIDED our next setpoint would undo it: that is the pilot's hand on the stick.
     pub fn observe_station(&mut self, what: &str) {
@@ -367,6 +385,9 @@ impl Executor {
     pub fn observe_outcome(&mut self, command: &Command, outcome: &Result<(), CommandError>, now: Stamp) {
         self.observe_payload(command, outcome);
         let ours = self.pending.as_ref().is_some_and(|pending| pending.command == *command);
+        if let Command::TakeOff { .. } = command {
+            self.take_off.answered(outcome.is_ok());
+        }
         if *command == Command::SetHome {
             // Refused, it is as without: the autopilot takes home where it is armed.
             self.home_fixed = true;
