@@ -42,6 +42,9 @@ const PASSES: usize = 60;
 const KEPT_MPS: f64 = 1e-9;
 /// And what is still refused by more than this after all passes can't be kept, metres per second.
 const REFUSED_MPS: f64 = 0.05;
+/// No constraint presses by more than this, metres per second: far above what flies, and far below where contradicting ones would press
+/// each other beyond all numbers.
+const PRESSED_MPS_MAX: f64 = 1e3;
 /// Where not everything can be kept, how easily a constraint gives at its kept distance. Nearer it gives less.
 const GIVE: f64 = 0.5;
 
@@ -158,6 +161,7 @@ fn pressed(wanted_ned_mps: Vector3<f64>, constraints: &[Constraint], softness: f
             let give = softness * one.give;
             let refused_mps = one.bound_mps - one.normal.dot(&velocity) - give * *pressure_mps;
             let pressed_mps = f64::max(*pressure_mps + refused_mps / (one.normal.dot(&one.push).max(0.2) + give), 0.0);
+            let pressed_mps = pressed_mps.min(PRESSED_MPS_MAX);
             velocity += one.push * (pressed_mps - *pressure_mps);
             change_mps += (pressed_mps - *pressure_mps).abs();
             *pressure_mps = pressed_mps;
@@ -223,8 +227,8 @@ pub fn filter(
     let lead_m = points_ned_m[1] - points_ned_m[0];
     let pairs = obstacles.iter().flat_map(|obstacle| {
         let [mut own, reference] = points_ned_m.map(|point| constraint(point, obstacle));
-        // The autopilot flies after its reference by this much faster than it is asked to.
-        own.bound_mps += (-own.normal.dot(&lead_m) * CHASE_HZ).max(0.0);
+        // The autopilot flies after its reference by this much faster than it is asked to; after a place that has leapt it doesn't fly.
+        own.bound_mps += (-own.normal.dot(&lead_m) * CHASE_HZ).clamp(0.0, limits.speed_mps_max);
         [own, reference]
     });
     // Most are far off, and can't be broken by any speed that is flown.
@@ -276,6 +280,21 @@ mod tests {
         let velocity = filter(Vector3::new(5.0, 0.0, 0.0), [own, own], goal, &[still(5.5, 0.0, -5.0)], &Limits::default());
         assert!(velocity.y > 0.5, "{velocity}");
         assert!(velocity.x <= -opening_mps_min(0.5) + 1e-9, "{velocity}");
+    }
+
+    /// A place that leapt by hundreds of kilometres, among many: what comes out is a number, and the limits make a speed of it.
+    #[test]
+    fn among_many_and_with_a_place_that_leapt_far_it_stays_a_number() {
+        let limits = Limits::default();
+        let crowd: Vec<_> =
+            (0..60).map(|index| f64::from(index) * 2.4).map(|a| still(40.0 * a.cos(), 40.0 * a.sin(), a)).collect();
+        for leap_m in [10.0, 1e3, 7e5, 1e7] {
+            for leap in [Vector3::new(0.0, 0.0, leap_m), Vector3::new(leap_m, 3.0, 0.0), Vector3::new(1.0, -leap_m, leap_m)] {
+                let here = Vector3::new(18.0, 17.0, -5.0) + leap;
+                let velocity = filter(Vector3::new(0.0, 0.0, -1.5), [here, here - leap], here, &crowd, &limits);
+                assert!(velocity.norm() < 1e6, "{leap}: {velocity}");
+            }
+        }
     }
 
     #[test]
