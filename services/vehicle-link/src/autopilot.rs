@@ -47,7 +47,8 @@ pub struct Heard {
 pub struct Autopilot {
     wanted: Option<u8>,
     address: Option<Address>,
-    datum: Datum,
+    /// With the home that it took off from.
+    datum_of_flight: Datum,
     local: LocalFinder,
     telemetry: Telemetry,
     streams: Streams,
@@ -75,7 +76,7 @@ impl Autopilot {
         Ok(Self {
             wanted: (config.system_id != 0).then_some(config.system_id),
             address: None,
-            datum: Datum { frame: origin.frame(), home_height_m: config.home_height_m },
+            datum_of_flight: Datum { frame: origin.frame(), home_height_m: config.home_height_m },
             local: LocalFinder::default(),
             telemetry: Telemetry::new(vehicle, role, origin, config.home_height_m),
             streams: Streams::default(),
@@ -115,7 +116,7 @@ impl Autopilot {
         self.identity.observe(message);
         self.telemetry.set_boot_offset_ns(self.sync.offset_ns(now));
         self.streams.observe(message.message_id(), now);
-        self.local.observe(message, &self.datum, now);
+        self.local.observe(message, &self.datum(), now);
         heard.transfer = self.transfers.observe(message, (system, OWN_COMPONENT), now);
         match message {
             MavMessage::STATUSTEXT(data) => heard.text = self.texts.observe(data, now).map(|text| text.text.clone()),
@@ -311,7 +312,13 @@ impl Autopilot {
     pub fn setpoint(&self, setpoint: &Setpoint, now: Stamp) -> Option<MavMessage> {
         let boot_ms = (now.seconds_since(self.started) * 1e3) as u64 as u32;
         let prefers_local = self.identity.family() == Family::Px4;
-        encode::setpoint(setpoint, &self.datum, self.local.shift_ned_m(now), prefers_local, self.address?, boot_ms)
+        encode::setpoint(setpoint, &self.datum(), self.local.shift_ned_m(now), prefers_local, self.address?, boot_ms)
+    }
+
+    /// Its home may have been set anew in flight: it counts heights from there.
+    fn datum(&self) -> Datum {
+        let home_height_m = self.datum_of_flight.home_height_m + self.telemetry.home_rise_m();
+        Datum { home_height_m, ..self.datum_of_flight }
     }
 
     /// Our header: same system as the vehicle, as its onboard computer.
@@ -396,6 +403,58 @@ mod tests {
                 autopilot.observe(header, &MavMessage::TIMESYNC(answer), t(now_s + 0.16));
             }
         }
+    }
+
+    /// Home set anew where it hovers, 5 m up: it counts from there, so that its own place is at 0 for it, in both forms of a setpoint.
+    #[test]
+    fn a_setpoint_counts_from_a_home_that_was_set_anew_in_flight() {
+        let origin = FleetOrigin(halcyon_model::Geodetic::from_deg(53.1, -2.9, 0.0));
+        let mut autopilot = Autopilot::new(&Config::default(), origin, t(0.0)).unwrap();
+        let (header, MavMessage::HEARTBEAT(beat)) = heartbeat() else { panic!() };
+        let armed = ardu::HEARTBEAT_DATA { base_mode: ardu::MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED, ..beat };
+        let landed_state = ardu::MavLandedState::MAV_LANDED_STATE_IN_AIR;
+        let home = |altitude| {
+            let (latitude, longitude) = (531_000_000, -29_000_000);
+            MavMessage::HOME_POSITION(ardu::HOME_POSITION_DATA { latitude, longitude, altitude, ..Default::default() })
+        };
+        let position = |relative_alt| {
+            MavMessage::GLOBAL_POSITION_INT(ardu::GLOBAL_POSITION_INT_DATA {
+                time_boot_ms: 1000,
+                lat: 531_000_000,
+                lon: -29_000_000,
+                alt: 45_000,
+                relative_alt,
+                ..Default::default()
+            })
+        };
+        let local = ardu::LOCAL_POSITION_NED_DATA { time_boot_ms: 1000, x: 2.0, y: 3.0, z: -7.0, ..Default::default() };
+        let landed = ardu::EXTENDED_SYS_STATE_DATA { landed_state, ..Default::default() };
+        let mut hear = |message: MavMessage, at_s: f64| drop(autopilot.observe(header, &message, t(at_s)));
+        hear(MavMessage::HEARTBEAT(armed), 0.0);
+        hear(MavMessage::ATTITUDE(ardu::ATTITUDE_DATA::default()), 0.0);
+        hear(home(40_000), 0.0);
+        hear(MavMessage::EXTENDED_SYS_STATE(landed), 0.0);
+        hear(position(5_000), 9.0);
+        hear(home(45_000), 9.5);
+        hear(position(0), 9.6);
+        hear(MavMessage::LOCAL_POSITION_NED(local), 9.6);
+        let (state, _) = autopilot.state(t(9.6)).unwrap();
+        assert!((state.position_ned_m.z + 5.0).abs() < 1e-9, "{}", state.position_ned_m);
+        let here = |acceleration_ned_mps2| Setpoint {
+            position_ned_m: state.position_ned_m,
+            velocity_ned_mps: nalgebra::Vector3::zeros(),
+            acceleration_ned_mps2,
+            heading_rad: None,
+        };
+        let Some(MavMessage::SET_POSITION_TARGET_GLOBAL_INT(sent)) = autopilot.setpoint(&here(None), t(9.6)) else { panic!() };
+        assert!(sent.alt.abs() < 1e-6, "{}", sent.alt);
+        let with = here(Some(nalgebra::Vector3::zeros()));
+        let Some(MavMessage::SET_POSITION_TARGET_LOCAL_NED(sent)) = autopilot.setpoint(&with, t(9.6)) else { panic!() };
+        assert!((sent.z + 7.0).abs() < 1e-6, "{}", sent.z);
+        // No home is a thousand kilometres lower.
+        autopilot.observe(header, &home(-1_000_000_000), t(9.7));
+        autopilot.observe(header, &position(5_000), t(9.7));
+        assert!((autopilot.state(t(9.7)).unwrap().0.position_ned_m.z + 5.0).abs() < 1e-9);
     }
 
     #[test]

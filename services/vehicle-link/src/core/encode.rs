@@ -43,7 +43,7 @@ impl Address {
 pub struct Datum {
     /// The fleet's local frame.
     pub frame: LocalFrame,
-    /// Height of home above mean water, metres.
+    /// Height above mean water of the home that the autopilot counts from now, metres.
     pub home_height_m: f64,
 }
 

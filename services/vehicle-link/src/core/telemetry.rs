@@ -32,8 +32,10 @@ const DISTANCE_SENSOR_S: f64 = 2.0;
 const SIGNAL_INVALID: u8 = 1;
 /// What is dated further ahead of now than this is not fresh, seconds.
 const AHEAD_S: f64 = 0.5;
-/// Home whose height changes in flight by more than this was set anew, metres; less is its own wander.
+/// Home whose height changes in flight by more than this was set anew, metres; less is its own wander. By more than the greatest, it is an
+/// error.
 const HOME_MOVED_M: f64 = 2.0;
+const HOME_MOVED_M_MAX: f64 = 1000.0;
 /// The home that the autopilot sets when it arms may be heard so late, seconds after it left the ground.
 const HOME_LATE_S: f64 = 5.0;
 /// The boot clock's offset to the fleet's is the least delay seen in the last one to two of these, seconds.
@@ -257,11 +259,13 @@ impl Telemetry {
         armed && self.landed.is_some_and(|landed| matches!(landed.0, LandedState::InAir | LandedState::Landing))
     }
 
-    /// What the autopilot's relative altitude lacks because its home was set anew in flight, metres.
-    fn home_rise_m(&self) -> f64 {
+    /// What the autopilot's relative altitude lacks because its home was set anew in flight, metres. What is sent to it is short of that,
+    /// too.
+    #[must_use]
+    pub fn home_rise_m(&self) -> f64 {
         let off_the_ground = self.off_the_ground_since.is_some();
         let rise_m = self.home.zip(self.home_of_flight).map_or(0.0, |(home, flight)| home.0.altitude_m - flight.altitude_m);
-        if off_the_ground && rise_m.abs() > HOME_MOVED_M { rise_m } else { 0.0 }
+        if off_the_ground && (HOME_MOVED_M..=HOME_MOVED_M_MAX).contains(&rise_m.abs()) { rise_m } else { 0.0 }
     }
 
     /// When the autopilot was last heard.
