@@ -274,8 +274,22 @@ impl Transaction {
         if matches!(self.phase, Phase::Accepted) { Ok(()) } else { Err(error) }
     }
 
+    /// Our clock may have been set back: nothing is awaited for longer than it would have been, or a retry would leave when whoever
+    /// asked has long given up.
+    fn watch_clock(&mut self, now: Stamp) {
+        let at_most = |until: &mut Stamp, for_s: f64| *until = (*until).min(now.plus_secs_f64(for_s));
+        match &mut self.phase {
+            Phase::Sent { until } => at_most(until, RETRY_S),
+            Phase::InProgress { until } => at_most(until, PROGRESS_S),
+            Phase::Refused { until, .. } => at_most(until, WORDS_S),
+            Phase::Waiting | Phase::Accepted | Phase::Overtaken => {}
+        }
+        self.started.iter_mut().for_each(|started| at_most(started, 0.0));
+    }
+
     /// Whether the transaction goes on.
     fn step(&mut self, to: Address, texts: &Texts, now: Stamp, effects: &mut Vec<Effect>) -> bool {
+        self.watch_clock(now);
         let outcome = match self.phase {
             Phase::Accepted => Ok(()),
             Phase::Overtaken => Err(CommandError::Overtaken),
@@ -413,6 +427,21 @@ mod tests {
             _ => None,
         };
         effects.iter().filter_map(confirmation).collect()
+    }
+
+    #[test]
+    fn a_clock_set_back_delays_no_retry() {
+        let mut commands = Commands::default();
+        commands.submit(1, Command::SetMode(FlightMode::Guided)).unwrap();
+        let texts = Texts::default();
+        assert_eq!(confirmations(&commands.poll(to(), &texts, t(400.0))), [0]);
+        let mut sent = Vec::new();
+        for step in 0..60 {
+            let effects = commands.poll(to(), &texts, t(0.1 * f64::from(step)));
+            sent.extend(confirmations(&effects).into_iter().map(|confirmation| (step, confirmation)));
+        }
+        assert_eq!(sent, [(10, 1), (20, 2), (30, 3)]);
+        assert!(commands.poll(to(), &texts, t(400.0)).is_empty(), "it ended with its last try");
     }
 
     #[test]

@@ -89,8 +89,9 @@ impl Streams {
         let mut due = Vec::new();
         for (stream, watch) in self.0.values_mut() {
             // Asked for at least once, so that it comes at our rate and not at another client's.
-            let fresh = watch.heard.is_some_and(|heard| now.seconds_since(heard) < stream.stall_s);
-            let waited = watch.asked.is_none_or(|asked| now.seconds_since(asked) >= watch.retry_s);
+            // What is dated ahead is neither: our clock was set back.
+            let fresh = watch.heard.is_some_and(|heard| (0.0..stream.stall_s).contains(&now.seconds_since(heard)));
+            let waited = watch.asked.is_none_or(|asked| !(0.0..watch.retry_s).contains(&now.seconds_since(asked)));
             if waited && (watch.asked.is_none() || !fresh) {
                 if watch.asked.is_some() {
                     watch.retry_s = (watch.retry_s * 2.0).min(RETRY_S_MAX);
