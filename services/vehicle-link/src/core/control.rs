@@ -13,6 +13,8 @@ pub enum Change {
     None,
     /// The pilot, or the autopilot's own fail-safe, took it.
     TakenOver,
+    /// The pilot, who has it already, chose another mode: whatever was asked for before is overtaken.
+    ChosenAnew,
     /// It was handed back.
     HandedBack,
 }
@@ -113,6 +115,7 @@ impl Control {
         match (before, self.hands_off) {
             (false, true) => Change::TakenOver,
             (true, false) => Change::HandedBack,
+            (true, true) if changed => Change::ChosenAnew,
             _ => Change::None,
         }
     }
@@ -143,6 +146,16 @@ mod tests {
         control.observe(Land, true, t(4.0));
         assert!(control.hands_off());
         assert_eq!(control.observe(Guided, true, t(5.0)), Change::HandedBack);
+    }
+
+    #[test]
+    fn a_mode_that_the_pilot_chooses_after_a_request_overtakes_it() {
+        let mut control = Control::default();
+        control.observe(Loiter, true, t(0.0));
+        control.expect(Guided, t(1.0));
+        assert_eq!(control.observe(Loiter, true, t(1.2)), Change::None);
+        assert_eq!(control.observe(Stabilize, true, t(1.4)), Change::ChosenAnew);
+        assert!(control.hands_off());
     }
 
     #[test]

@@ -320,6 +320,7 @@ impl Executor {
         }
         match self.control.observe(state.mode, state.armed, now) {
             Change::None => {}
+            Change::ChosenAnew => self.withdraw = true,
             Change::TakenOver => {
                 self.withdraw = true;
                 self.pending = None;
