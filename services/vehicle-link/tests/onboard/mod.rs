@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use halcyon_model::{FleetOrigin, Stamp, VehicleAction, VehicleCommand, VehicleId};
+use halcyon_model::{FleetOrigin, Stamp, VehicleAction, VehicleCommand, VehicleId, VehicleState};
 use halcyon_vehicle_link::Config;
 use halcyon_vehicle_link::autopilot::Autopilot;
 use halcyon_vehicle_link::core::commands::{Command, CommandError, Effect, Ticket};
@@ -37,6 +37,8 @@ pub(crate) struct Onboard {
     /// Of the last step.
     pub(crate) setpoints: Vec<Setpoint>,
     pub(crate) notes: Vec<Note>,
+    /// As the executor was told last.
+    pub(crate) own: Option<VehicleState>,
     next_ticket: Ticket,
 }
 
@@ -60,6 +62,7 @@ impl Onboard {
             open: BTreeMap::new(),
             setpoints: Vec::new(),
             notes: Vec::new(),
+            own: None,
             next_ticket: 1,
         }
     }
@@ -78,6 +81,7 @@ impl Onboard {
         if heard.state
             && let Some((state, mode_heard)) = self.autopilot.state(now)
         {
+            self.own = Some(state.clone());
             self.executor.observe_self(state, mode_heard, now);
         }
         sent
