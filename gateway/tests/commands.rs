@@ -105,7 +105,7 @@ async fn a_refusal_and_silence_have_their_own_answers() {
 async fn every_action_goes_to_its_mission_under_its_operator() {
     let gateway = gateway().await;
     gateway.app.store.write().mission(mission("m-1", MissionPhase::Waiting, 0.0), at(0.0));
-    for action in ["approve", "dispatch", "pause", "resume", "abort"] {
+    for action in ["approve", "dispatch", "pause", "resume", "abort", "release", "skip-release"] {
         let request =
             gateway.client.post(gateway.url(&format!("/api/v1/missions/m-1/{action}"))).header("halcyon-operator", "Ada");
         assert_eq!(gateway.send(request).await.status, 202, "{action}");
@@ -113,7 +113,7 @@ async fn every_action_goes_to_its_mission_under_its_operator() {
     let commands = gateway.played.mission_commands.lock().unwrap();
     let names: Vec<_> =
         commands.iter().map(|command| format!("{:?}", command.action).split('(').next().unwrap().to_owned()).collect();
-    assert_eq!(names, ["Approve", "Dispatch", "Pause", "Resume", "Abort"]);
+    assert_eq!(names, ["Approve", "Dispatch", "Pause", "Resume", "Abort", "Release", "SkipRelease"]);
     assert!(commands.iter().all(|command| command.who == "Ada"));
 }
 

@@ -64,7 +64,7 @@ async fn a_mission_says_what_can_be_done_and_why_not() {
     let error_m = open["touchdown_error_m"].as_f64().unwrap();
     assert!((error_m - 0.5).abs() < 1e-9, "0.3 north and 0.4 east of the point is 0.5 m, not {error_m}");
     let done = gateway.get("/api/v1/missions/m-2").await.json;
-    for action in ["approve", "dispatch", "pause", "resume", "abort"] {
+    for action in ["approve", "dispatch", "pause", "resume", "abort", "release", "skip_release"] {
         assert_eq!(done["can"][action], json!({"allowed": false, "why": "The mission is completed"}), "{action}");
     }
     // The newest first.

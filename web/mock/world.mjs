@@ -279,7 +279,7 @@ export class World {
       acceleration: { north_mps2: 0, east_mps2: 0, down_mps2: 0 }, range_m: onGround || one.height_m > 40 ? null : one.height_m,
       ages: { mode_s: 0.4, attitude_s: 0.05, landed_s: 0.4, battery_s: 0.4, fix_s: 0.2, estimator_s: 0.2, home_s: 1.5 },
       link: { loss_percent: 0.4, round_trip_ms: 12, received: 40 * Math.floor(this.t_s()), signed: false },
-      firmware: { autopilot: 'ArduPilot', vehicle: 'quadrotor', version: '4.6.0' },
+      firmware: { autopilot: 'ArduPilot', vehicle: 'quadrotor', version: '4.6.0' }, has_payload: false,
     };
   }
 
@@ -287,7 +287,7 @@ export class World {
     const { since_s, clear, resumeTo, ...rest } = one;
     return {
       ...rest, age_s: 0, point: point(one.point), touchdown: one.touchdown ? point(one.touchdown) : null,
-      touchdown_error_m: one.touchdown ? distance(one.touchdown, one.point) : null, can: can(one),
+      touchdown_error_m: one.touchdown ? distance(one.touchdown, one.point) : null, release_problem: null, can: can(one),
     };
   }
 

@@ -115,6 +115,15 @@ action!(
     abort, "abort_mission", "/api/v1/missions/{id}/abort", Abort
 );
 
+action!(
+    /// Tries once more to let the payload go, after a refusal or no answer.
+    release, "release_mission_payload", "/api/v1/missions/{id}/release", Release
+);
+action!(
+    /// Completes the mission though the payload was not let go; that stays on record.
+    skip_release, "skip_mission_release", "/api/v1/missions/{id}/skip-release", SkipRelease
+);
+
 /// Events that concern a mission, the newest first.
 #[utoipa::path(get, path = "/api/v1/missions/{id}/events", tag = "missions", operation_id = "list_mission_events",
     params(("id" = String, Path, pattern = "^[A-Za-z0-9._-]{1,64}$"), EventPageQuery), responses((status = 200, body = Page<Event>)))]

@@ -101,6 +101,8 @@ pub fn routes() -> OpenApiRouter<App> {
         .routes(routes!(missions::pause))
         .routes(routes!(missions::resume))
         .routes(routes!(missions::abort))
+        .routes(routes!(missions::release))
+        .routes(routes!(missions::skip_release))
         .routes(routes!(missions::events))
         .routes(routes!(sea_states::list))
         .routes(routes!(rigs::surface))

@@ -72,15 +72,33 @@ pub fn abort(mission: &Mission) -> Result<(), String> {
     still_open(mission)
 }
 
+/// Whether the payload's release can be tried again, or skipped.
+///
+/// # Errors
+/// Why not, for people.
+pub fn release(mission: &Mission) -> Result<(), String> {
+    still_open(mission)?;
+    match (mission.phase, &mission.release_problem) {
+        (Phase::Releasing, Some(_)) => Ok(()),
+        (Phase::Releasing, None) => Err("The payload is being released".into()),
+        _ => Err("The follower has not landed yet".into()),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use halcyon_model::{Approval, LocalPoint, MissionId, MissionSpec, Stamp};
 
     use super::*;
 
-    /// Which of approve, dispatch, pause, resume and abort can be done in `phase`, by their first letters.
+    /// Which of approve, dispatch, pause, resume, abort and release can be done in `phase`, by their first letters.
     #[track_caller]
     fn check(phase: Phase, dispatch_on_approval: bool, expected: &str) {
+        check_with(None, phase, dispatch_on_approval, expected);
+    }
+
+    #[track_caller]
+    fn check_with(release_problem: Option<&str>, phase: Phase, dispatch_on_approval: bool, expected: &str) {
         let spec = MissionSpec {
             name: "m".into(),
             point: LocalPoint::new(0.0, 0.0),
@@ -100,6 +118,7 @@ mod tests {
             verdict: None,
             h_s_m: None,
             touchdown: None,
+            release_problem: release_problem.map(Into::into),
             history: Vec::new(),
         };
         let rules = [
@@ -108,6 +127,7 @@ mod tests {
             ('p', pause(&mission)),
             ('r', resume(&mission)),
             ('x', abort(&mission)),
+            ('l', release(&mission)),
         ];
         let able: String = rules.iter().filter(|(_, rule)| rule.is_ok()).map(|(letter, _)| letter).collect();
         assert_eq!(able, expected, "{phase:?}");
@@ -124,6 +144,10 @@ mod tests {
                     check(phase, false, "dpx");
                 }
                 Phase::Paused => check(phase, true, "rx"),
+                Phase::Releasing => {
+                    check(phase, true, "px");
+                    check_with(Some("refused"), phase, true, "pxl");
+                }
                 Phase::Completed | Phase::Aborted | Phase::Failed => check(phase, true, ""),
                 _ => check(phase, true, "px"),
             }

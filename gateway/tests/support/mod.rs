@@ -57,7 +57,9 @@ impl Commands for Shared {
             | MissionAction::Dispatch(id)
             | MissionAction::Pause(id)
             | MissionAction::Resume(id)
-            | MissionAction::Abort(id) => Some(id.clone()),
+            | MissionAction::Abort(id)
+            | MissionAction::Release(id)
+            | MissionAction::SkipRelease(id) => Some(id.clone()),
             MissionAction::Form(_) | MissionAction::Disband(_) => None,
         };
         self.0.mission_commands.lock().unwrap().push(command);
@@ -206,6 +208,7 @@ pub fn vehicle(id: &str, age_s: f64) -> VehicleState {
         ages: halcyon_model::Ages::default(),
         link: None,
         firmware: None,
+        has_payload: false,
     }
 }
 
@@ -237,6 +240,7 @@ pub fn mission(id: &str, phase: MissionPhase, created_offset_s: f64) -> Mission 
         verdict: None,
         h_s_m: None,
         touchdown: Some(LocalPoint::new(30.3, 40.4)),
+        release_problem: None,
         history: vec![Transition { stamp: at(created_offset_s), phase, who: "planner".into(), why: "created".into() }],
     }
 }

@@ -49,6 +49,8 @@ impl Wire for MissionCommand {
             MissionAction::Pause(id) => Action::Pause(id.to_string()),
             MissionAction::Resume(id) => Action::Resume(id.to_string()),
             MissionAction::Abort(id) => Action::Abort(id.to_string()),
+            MissionAction::Release(id) => Action::Release(id.to_string()),
+            MissionAction::SkipRelease(id) => Action::SkipRelease(id.to_string()),
             MissionAction::Form(spec) => Action::Form(formation_to(spec)),
             MissionAction::Disband(leader) => Action::Disband(leader.to_string()),
         };
@@ -73,6 +75,8 @@ impl Wire for MissionCommand {
             Action::Pause(mission) => MissionAction::Pause(id("pause", &mission)?),
             Action::Resume(mission) => MissionAction::Resume(id("resume", &mission)?),
             Action::Abort(mission) => MissionAction::Abort(id("abort", &mission)?),
+            Action::Release(mission) => MissionAction::Release(id("release", &mission)?),
+            Action::SkipRelease(mission) => MissionAction::SkipRelease(id("skip_release", &mission)?),
             Action::Form(spec) => MissionAction::Form(formation_from(&spec)?),
             Action::Disband(leader) => MissionAction::Disband(id("disband", &leader)?),
         };

@@ -74,6 +74,7 @@ impl Wire for Mission {
             h_s_m: self.h_s_m.as_ref().map(estimate_to),
             touchdown: self.touchdown.as_ref().map(point_to),
             history: self.history.iter().map(transition).collect(),
+            release_problem: self.release_problem.clone().unwrap_or_default(),
         }
     }
 
@@ -96,6 +97,7 @@ impl Wire for Mission {
             verdict: verdict_state_from("verdict", proto.verdict)?,
             h_s_m: optional("h_s_m", proto.h_s_m, estimate_from)?,
             touchdown: optional("touchdown", proto.touchdown, point_from)?,
+            release_problem: Some(text("release_problem", proto.release_problem)?).filter(|problem| !problem.is_empty()),
             history: proto.history.into_iter().map(transition).collect::<Result<_, _>>().within("history")?,
         })
     }
@@ -113,6 +115,6 @@ mod tests {
             assert_eq!(wire.as_str_name(), format!("MISSION_PHASE_{}", phase.as_str().to_uppercase()));
             assert_eq!(phase_from("phase", phase_to(phase)), Ok(phase));
         }
-        assert!(phase_from("phase", 0).is_err() && phase_from("phase", 13).is_err() && phase_from("phase", -1).is_err());
+        assert!(phase_from("phase", 0).is_err() && phase_from("phase", 14).is_err() && phase_from("phase", -1).is_err());
     }
 }

@@ -193,6 +193,7 @@ impl Wire for VehicleState {
             ages: Some(ages_to(&self.ages)),
             link: self.link.as_ref().map(link_to),
             firmware: self.firmware.as_ref().map(firmware_to),
+            has_payload: self.has_payload,
         }
     }
 
@@ -225,6 +226,7 @@ impl Wire for VehicleState {
             ages: optional("ages", proto.ages, ages_from)?.unwrap_or_default(),
             link: optional("link", proto.link, link_from)?,
             firmware: optional("firmware", proto.firmware, firmware_from)?,
+            has_payload: proto.has_payload,
         })
     }
 }

@@ -98,6 +98,7 @@ fn state(truth: &SimTruth) -> VehicleState {
         ages: halcyon_model::Ages::default(),
         link: None,
         firmware: None,
+        has_payload: false,
     }
 }
 

@@ -6,11 +6,12 @@ use std::time::Duration;
 
 use anyhow::Context as _;
 use halcyon_chassis::{Context, EventDraft, Publisher, topics};
-use halcyon_model::{CommandReply, DispatchPlan, Mission, MissionId};
+use halcyon_model::{CommandReply, DispatchPlan, Mission, MissionId, VehicleAction, VehicleCommand};
+use tokio::task::JoinSet;
 use tracing::{debug, trace};
 
 use crate::config::Config;
-use crate::core::{Effects, Ignored, Notice, Planner};
+use crate::core::{Effects, Ignored, Notice, Planner, ReleaseOrder};
 use crate::store::StoreThread;
 
 /// Finished missions whose last state stays available to those who join later.
@@ -27,6 +28,7 @@ pub async fn run(context: Context, config: Config) -> anyhow::Result<()> {
     let mut vehicles = context.bus.subscribe(&topics::vehicle_states()).await?;
     let mut seas = context.bus.subscribe(&topics::sea_states()).await?;
     let (store, saved) = StoreThread::open(PathBuf::from(&config.store)).await?;
+    let mut answers = JoinSet::new();
     let mut out = Outlet {
         store,
         plans: context.bus.publisher(&topics::plan()).await?,
@@ -36,7 +38,7 @@ pub async fn run(context: Context, config: Config) -> anyhow::Result<()> {
     };
     let step = Duration::from_secs_f64(config.step_s);
     let (mut planner, effects) = Planner::restore(config, saved, context.clock.now());
-    out.announce(effects).await?;
+    out.announce(effects, &mut answers).await?;
     // Served only now: a command must find the missions that the store knows.
     let mut commands = context.bus.serve(&topics::mission_command()).await?;
     let mut ticker = context.clock.every(step);
@@ -54,21 +56,26 @@ pub async fn run(context: Context, config: Config) -> anyhow::Result<()> {
                 let now = context.clock.now();
                 ignored(planner.observe_sea(sea, now), "sea_state", rig.as_str());
                 // A verdict that turned must not wait for the next tick.
-                out.announce(planner.step(now)).await?;
+                out.announce(planner.step(now), &mut answers).await?;
+            }
+            Some(answered) = answers.join_next() => {
+                let Answered { mission, attempt, answer } = answered.context("a release was given up")?;
+                debug!(%mission, ?answer, "payload");
+                out.announce(planner.observe_release(&mission, attempt, answer, context.clock.now()), &mut answers).await?;
             }
             incoming = commands.recv() => {
                 let incoming = incoming?;
                 let (reply, effects) = planner.command(&incoming.command, context.clock.now());
                 debug!(who = incoming.command.who, accepted = reply.accepted, reason = reply.reason, "mission command");
                 metrics::counter!("planner_commands_total", "accepted" => reply.accepted.to_string()).increment(1);
-                if let Err(error) = out.announce(effects).await {
+                if let Err(error) = out.announce(effects, &mut answers).await {
                     incoming.reply(&CommandReply::refused(reply.stamp, format!("it could not be stored: {error:#}"))).await;
                     return Err(error);
                 }
                 incoming.reply(&reply).await;
             }
             _ = ticker.tick() => {
-                out.announce(planner.step(context.clock.now())).await?;
+                out.announce(planner.step(context.clock.now()), &mut answers).await?;
                 let under_way = planner.missions().count();
                 metrics::gauge!("planner_missions").set(under_way as f64);
                 context.health.ready(format!("missions under way: {under_way}"));
@@ -101,8 +108,8 @@ struct Outlet {
 
 impl Outlet {
     /// Stores, then announces.
-    async fn announce(&mut self, effects: Effects) -> anyhow::Result<()> {
-        let Effects { records, plan, missions, notices } = effects;
+    async fn announce(&mut self, effects: Effects, answers: &mut JoinSet<Answered>) -> anyhow::Result<()> {
+        let Effects { records, plan, missions, notices, releases } = effects;
         self.store.append(records).await.context("what the planner decided was not stored, and so not announced")?;
         if let Some(plan) = plan {
             self.plans.put(&plan).await?;
@@ -113,6 +120,10 @@ impl Outlet {
         }
         for notice in notices {
             self.context.event(draft(notice)).await;
+        }
+        // Each is waited for beside everything else. There is at most one a mission.
+        for order in releases {
+            answers.spawn(release(self.context.clone(), order));
         }
         Ok(())
     }
@@ -135,6 +146,29 @@ impl Outlet {
         }
         Ok(())
     }
+}
+
+/// What came of a request to let a payload go.
+struct Answered {
+    mission: MissionId,
+    attempt: u32,
+    answer: Result<(), String>,
+}
+
+/// Asks the vehicle, and waits until its deadline.
+async fn release(context: Context, order: ReleaseOrder) -> Answered {
+    let ReleaseOrder { mission, vehicle, attempt, stamp, deadline } = order;
+    let who = format!("mission {mission}");
+    let topic = topics::vehicle_command(&vehicle);
+    let command = VehicleCommand { stamp, deadline, who, vehicle, action: VehicleAction::ReleasePayload };
+    // Fleet time may be faster than the wall's; longer than this nobody waits.
+    let timeout = Duration::from_secs_f64(deadline.seconds_since(stamp).max(0.1));
+    let answer = match context.bus.call(&topic, &command, timeout).await {
+        Ok(reply) if reply.accepted => Ok(()),
+        Ok(reply) => Err(reply.reason),
+        Err(error) => Err(error.to_string()),
+    };
+    Answered { mission, attempt, answer }
 }
 
 fn draft(notice: Notice) -> EventDraft {

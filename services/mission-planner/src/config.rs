@@ -84,6 +84,10 @@ pub struct Config {
     pub clearing_max_s: f64,
     /// How long the landing may take, waiting for clearance included.
     pub landing_max_s: f64,
+    /// How long a vehicle that landed may take to answer that its payload is let go.
+    pub release_answer_s: f64,
+    /// How long a person may take to choose when it was not.
+    pub release_wait_max_s: f64,
     /// How long a mission may be paused.
     pub paused_max_s: f64,
     /// A vehicle that isn't home so long after its mission is reported.
@@ -130,6 +134,8 @@ impl Default for Config {
             joining_max_s: 600.0,
             clearing_max_s: 180.0,
             landing_max_s: 180.0,
+            release_answer_s: 10.0,
+            release_wait_max_s: 600.0,
             paused_max_s: 600.0,
             return_max_s: 900.0,
         }
@@ -173,6 +179,8 @@ impl Config {
             ("joining_max_s", self.joining_max_s),
             ("clearing_max_s", self.clearing_max_s),
             ("landing_max_s", self.landing_max_s),
+            ("release_answer_s", self.release_answer_s),
+            ("release_wait_max_s", self.release_wait_max_s),
             ("paused_max_s", self.paused_max_s),
             ("return_max_s", self.return_max_s),
         ];

@@ -1,12 +1,12 @@
 //! Missions, formation slots, assignment, dispatch plans.
 //!
 //! Reads `vehicle/*/state` and `rig/*/sea-state`, serves `mission/command`; writes `plan`, `mission/{mission}/state` and
-//! `event`. Units are SI, places are metres north and east of the fleet's origin, headings are clockwise from true north.
+//! `event`, and asks vehicles to release their payload. Units are SI, places are metres north and east of the fleet's origin, headings are clockwise from true north.
 //!
 //! A mission surveys one point, waits for a safe verdict and for approval, sends one follower beside the leader, clears the
-//! spot and lets the follower land there:
+//! spot, lets the follower land there, and lets its payload go if it carries one:
 //!
-//! `waiting → transit → assessing → awaiting_approval → approved → joining → clearing → landing → completed`
+//! `waiting → transit → assessing → awaiting_approval → approved → joining → clearing → landing → releasing → completed`
 //!
 //! and from each of these to `paused` and back, to `aborted`, and to `failed`.
 //!
@@ -19,6 +19,9 @@
 //! **Invariant:** generations strictly increase over the planner's whole life. At most one planner has the store.
 //!
 //! **Invariant:** every phase ends, in time if by nothing else.
+//!
+//! **Invariant:** a mission whose follower carries a payload completes only when the vehicle has confirmed its release, or a person has said
+//! to go on without.
 //!
 //! **Invariant:** nothing under [`core`] knows the bus, the clock or the disk.
 //!

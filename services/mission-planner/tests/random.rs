@@ -20,6 +20,8 @@ enum Happening {
     StraySea(f64, f64, f64, VerdictState),
     Create(usize, bool, f64, f64),
     Command(usize, usize),
+    /// What payloads answer from now on.
+    Release(Option<bool>),
     Restart(f64),
 }
 
@@ -40,7 +42,8 @@ fn happening() -> impl Strategy<Value = Happening> {
         1 => (vehicle, -10.0..80.0f64, -30.0..80.0f64).prop_map(|(v, n, e)| Happening::Teleport(v, n, e)),
         2 => (-10.0..80.0f64, -30.0..80.0f64, -30.0..4.0f64, verdict()).prop_map(|(n, e, age, v)| Happening::StraySea(n, e, age, v)),
         3 => (0..3usize, any::<bool>(), 20.0..80.0f64, -30.0..80.0f64).prop_map(|(m, auto, n, e)| Happening::Create(m, auto, n, e)),
-        5 => (0..3usize, 0..5usize).prop_map(|(m, action)| Happening::Command(m, action)),
+        5 => (0..3usize, 0..7usize).prop_map(|(m, action)| Happening::Command(m, action)),
+        1 => any::<Option<bool>>().prop_map(Happening::Release),
         1 => (0.2..12.0f64).prop_map(Happening::Restart),
     ]
 }
@@ -88,10 +91,13 @@ fn happens(world: &mut World, what: &Happening) {
                 1 => MissionAction::Dispatch(id),
                 2 => MissionAction::Pause(id),
                 3 => MissionAction::Resume(id),
+                4 => MissionAction::Release(id),
+                5 => MissionAction::SkipRelease(id),
                 _ => MissionAction::Abort(id),
             };
             world.command_as("bert", action);
         }
+        Happening::Release(answer) => world.release = answer.map(|yes| if yes { Ok(()) } else { Err("stuck".into()) }),
         Happening::Restart(away_s) => world.restart(*away_s),
     }
 }
@@ -102,6 +108,8 @@ proptest! {
     #[test]
     fn whatever_happens_the_rules_hold_and_abort_ends_everything(happenings in prop::collection::vec(happening(), 1..40)) {
         let mut world = World::new(2, 3);
+        world.vehicle("follower-1").has_payload = true;
+        world.vehicle("follower-2").has_payload = true;
         for what in &happenings {
             happens(&mut world, what);
             // Busy in one mission is busy for all.

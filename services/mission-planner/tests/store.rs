@@ -36,6 +36,7 @@ fn records() -> (Vec<Record>, Mission, Course) {
         verdict: Some(VerdictState::Inconclusive),
         h_s_m: Some(Estimate { value: 0.1, low: 0.05, high: 0.2 }),
         touchdown: Some(LocalPoint::new(0.1, 0.2)),
+        release_problem: Some("refused: in the air".into()),
         history: history.clone(),
     };
     let course = Course {
@@ -47,7 +48,15 @@ fn records() -> (Vec<Record>, Mission, Course) {
         station_since: Some(Stamp::from_nanos(-5)),
         first_on_station: Some(Stamp::from_nanos(6)),
     };
-    let bare = Mission { leader: None, follower: None, verdict: None, h_s_m: None, touchdown: None, ..mission.clone() };
+    let bare = Mission {
+        leader: None,
+        follower: None,
+        verdict: None,
+        h_s_m: None,
+        touchdown: None,
+        release_problem: None,
+        ..mission.clone()
+    };
     let records = vec![
         Record::Created { id: id.clone(), spec },
         Record::Entered {
@@ -133,8 +142,8 @@ fn a_file_that_cannot_be_trusted_is_refused_and_left_as_it_is() {
     refused(&path("other"), "is not a mission store");
 
     drop(Store::open(&path("newer")).unwrap());
-    rusqlite::Connection::open(path("newer")).unwrap().execute_batch("PRAGMA user_version = 3").unwrap();
-    refused(&path("newer"), "has schema version 3, this build knows 2");
+    rusqlite::Connection::open(path("newer")).unwrap().execute_batch("PRAGMA user_version = 4").unwrap();
+    refused(&path("newer"), "has schema version 4, this build knows 3");
 
     fs::create_dir(path("folder")).unwrap();
     refused(&path("folder"), "could not be opened");
@@ -201,8 +210,33 @@ fn a_store_of_the_first_version_is_taken_over() {
     )
     .unwrap();
     drop(old);
+    taken_over(&path);
+}
+
+/// The second version had formations, and no releases.
+#[test]
+fn a_store_of_the_second_version_is_taken_over() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("missions.sqlite");
+    let old = rusqlite::Connection::open(&path).unwrap();
+    old.execute_batch(include_str!("../src/store/schema.sql")).unwrap();
+    old.execute_batch(include_str!("../src/store/formation.sql")).unwrap();
+    old.execute_batch(
+        "PRAGMA application_id = 0x48414C43; PRAGMA user_version = 2; INSERT INTO generation (reserved) VALUES (42);",
+    )
+    .unwrap();
+    drop(old);
+    taken_over(&path);
+    let (records, mission, _) = records();
+    let mut store = Store::open(&path).unwrap();
+    store.append(&records).unwrap();
+    assert_eq!(store.load().unwrap().missions[0].mission, mission);
+}
+
+#[track_caller]
+fn taken_over(path: &Path) {
     for _ in 0..2 {
-        let store = Store::open(&path).unwrap();
+        let store = Store::open(path).unwrap();
         assert_eq!(store.load().unwrap(), Saved { generation: 42, ..Saved::default() });
     }
 }

@@ -53,6 +53,10 @@ pub enum MissionAction {
     Resume(MissionId),
     /// Everyone returns. Works from every state.
     Abort(MissionId),
+    /// Try once more to let the payload go.
+    Release(MissionId),
+    /// Complete the mission though the payload was not let go.
+    SkipRelease(MissionId),
     /// Followers keep a shape about a leader, until they are told otherwise. The same again is answered as before; another shape, or
     /// others, changes the formation that the leader has.
     Form(FormationSpec),

@@ -52,6 +52,8 @@ pub enum MissionPhase {
     Clearing,
     /// The follower approaches, descends and lands.
     Landing,
+    /// The follower has landed, and lets its payload go; or a person must choose, since it didn't.
+    Releasing,
     /// Paused by a person: all hold.
     Paused,
     /// The follower landed.
@@ -63,8 +65,8 @@ pub enum MissionPhase {
 }
 
 impl MissionPhase {
-    /// Every phase, in order.
-    pub const ALL: [Self; 12] = [
+    /// Every phase, in the order of their numbers on the wire.
+    pub const ALL: [Self; 13] = [
         Self::Waiting,
         Self::Transit,
         Self::Assessing,
@@ -77,6 +79,7 @@ impl MissionPhase {
         Self::Completed,
         Self::Aborted,
         Self::Failed,
+        Self::Releasing,
     ];
 
     /// Lower-case name with underscores, as REST and the store write it.
@@ -91,6 +94,7 @@ impl MissionPhase {
             Self::Joining => "joining",
             Self::Clearing => "clearing",
             Self::Landing => "landing",
+            Self::Releasing => "releasing",
             Self::Paused => "paused",
             Self::Completed => "completed",
             Self::Aborted => "aborted",
@@ -145,6 +149,8 @@ pub struct Mission {
     pub h_s_m: Option<Estimate>,
     /// Where the follower came down, by its own position.
     pub touchdown: Option<LocalPoint>,
+    /// Why the payload was not let go, if it was to be: a person tries again, or goes on without.
+    pub release_problem: Option<String>,
     /// Every transition, oldest first.
     pub history: Vec<Transition>,
 }

@@ -286,6 +286,8 @@ pub struct VehicleState {
     pub link: Option<LinkQuality>,
     /// What flies it.
     pub firmware: Option<Firmware>,
+    /// It carries something that it can let go: a payload is configured.
+    pub has_payload: bool,
 }
 
 /// The simulator's truth about one vehicle. Exists only in simulation; nothing that flies may read it.

@@ -58,6 +58,7 @@ fn state(index: usize, now: Stamp, flown_s: f64) -> VehicleState {
         ages: Ages::default(),
         link: None,
         firmware: None,
+        has_payload: false,
     }
 }
 

@@ -95,6 +95,7 @@ fn state(leader: &VehicleId, context: &halcyon_chassis::Context) -> VehicleState
         ages: halcyon_model::Ages::default(),
         link: None,
         firmware: None,
+        has_payload: false,
     }
 }
 

@@ -56,6 +56,7 @@ fn state(vehicle: &str, stamp: Stamp, elevation_m: Option<f64>) -> VehicleState 
         ages: Ages::default(),
         link: None,
         firmware: None,
+        has_payload: false,
     }
 }
 

@@ -48,10 +48,10 @@ const post = <T>(path: string, body?: unknown): Promise<T> =>
 
 const segment = encodeURIComponent;
 
-export type MissionAction = 'approve' | 'dispatch' | 'pause' | 'resume' | 'abort';
+export type MissionAction = 'approve' | 'dispatch' | 'pause' | 'resume' | 'abort' | 'release' | 'skip_release';
 
 export const createMission = (mission: CreateMission): Promise<CommandResult> => post('/api/v1/missions', mission);
-export const commandMission = (id: string, action: MissionAction): Promise<CommandResult> => post(`/api/v1/missions/${segment(id)}/${action}`);
+export const commandMission = (id: string, action: MissionAction): Promise<CommandResult> => post(`/api/v1/missions/${segment(id)}/${action.replace('_', '-')}`);
 
 /** The newest pictures of a rig, or `null` if there are none yet. */
 export async function preview(rig: string): Promise<Preview | null> {

@@ -58,7 +58,7 @@ const CHECKS: Record<StreamMessage['type'], Record<string, (value: unknown) => b
     point: isPlace,
     touchdown: (value) => isNullOr(value, isPlace),
     history: (value) => isEvery(value, (step) => isObject(step) && isStamp(step['stamp']) && isText(step['phase'])),
-    can: (value) => isObject(value) && ['approve', 'dispatch', 'pause', 'resume', 'abort'].every((key) => isPossibility(value[key])),
+    can: (value) => isObject(value) && ['approve', 'dispatch', 'pause', 'resume', 'abort', 'release', 'skip_release'].every((key) => isPossibility(value[key])),
   },
   plan: {
     generation: isNumber,

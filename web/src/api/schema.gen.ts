@@ -196,6 +196,23 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/missions/{id}/release": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /** Tries once more to let the payload go, after a refusal or no answer. */
+        post: operations["release_mission_payload"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/missions/{id}/resume": {
         parameters: {
             query?: never;
@@ -207,6 +224,23 @@ export interface paths {
         put?: never;
         /** Goes on. */
         post: operations["resume_mission"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{id}/skip-release": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /** Completes the mission though the payload was not let go; that stays on record. */
+        post: operations["skip_mission_release"];
         delete?: never;
         options?: never;
         head?: never;
@@ -982,6 +1016,8 @@ export interface components {
             phase: components["schemas"]["MissionPhase"];
             /** @description Where to look and to land. */
             point: components["schemas"]["Point"];
+            /** @description Why the payload was not let go, if it was to be. */
+            release_problem: string | null;
             /** @description When it last changed. */
             stamp: string;
             /**
@@ -1007,14 +1043,18 @@ export interface components {
             dispatch: components["schemas"]["Possibility"];
             /** @description Let everyone hold. */
             pause: components["schemas"]["Possibility"];
+            /** @description Try once more to let the payload go. */
+            release: components["schemas"]["Possibility"];
             /** @description Go on. */
             resume: components["schemas"]["Possibility"];
+            /** @description Complete the mission though the payload was not let go. */
+            skip_release: components["schemas"]["Possibility"];
         };
         /**
          * @description Where a mission is.
          * @enum {string}
          */
-        MissionPhase: "waiting" | "transit" | "assessing" | "awaiting_approval" | "approved" | "joining" | "clearing" | "landing" | "paused" | "completed" | "aborted" | "failed";
+        MissionPhase: "waiting" | "transit" | "assessing" | "awaiting_approval" | "approved" | "joining" | "clearing" | "landing" | "releasing" | "paused" | "completed" | "aborted" | "failed";
         /** @description One step of a mission: what changed, who did it, and why. */
         MissionTransition: {
             /** @description Into which phase. */
@@ -1083,6 +1123,8 @@ export interface components {
                 phase: components["schemas"]["MissionPhase"];
                 /** @description Where to look and to land. */
                 point: components["schemas"]["Point"];
+                /** @description Why the payload was not let go, if it was to be. */
+                release_problem: string | null;
                 /** @description When it last changed. */
                 stamp: string;
                 /**
@@ -1237,6 +1279,8 @@ export interface components {
                 estimator_ok: boolean;
                 firmware: components["schemas"]["Firmware"] | null;
                 fix: components["schemas"]["Fix"] | null;
+                /** @description It carries something that it can let go. */
+                has_payload: boolean;
                 /**
                  * Format: double
                  * @description Heading, degrees clockwise from true north, 0 to 360.
@@ -1851,6 +1895,8 @@ export interface components {
             estimator_ok: boolean;
             firmware: components["schemas"]["Firmware"] | null;
             fix: components["schemas"]["Fix"] | null;
+            /** @description It carries something that it can let go. */
+            has_payload: boolean;
             /**
              * Format: double
              * @description Heading, degrees clockwise from true north, 0 to 360.
@@ -2518,7 +2564,81 @@ export interface operations {
             };
         };
     };
+    release_mission_payload: {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description Makes a repeat harmless: the same key with the same request gets the first answer again. */
+                "Idempotency-Key"?: string;
+                /** @description Who commands this, for the record. */
+                "Halcyon-Operator"?: string;
+            };
+            path: {
+                id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            202: {
+                headers: {
+                    /** @description The mission */
+                    Location?: string;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CommandResult"];
+                };
+            };
+            /** @description A problem */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     resume_mission: {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description Makes a repeat harmless: the same key with the same request gets the first answer again. */
+                "Idempotency-Key"?: string;
+                /** @description Who commands this, for the record. */
+                "Halcyon-Operator"?: string;
+            };
+            path: {
+                id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            202: {
+                headers: {
+                    /** @description The mission */
+                    Location?: string;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CommandResult"];
+                };
+            };
+            /** @description A problem */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    skip_mission_release: {
         parameters: {
             query?: never;
             header?: {

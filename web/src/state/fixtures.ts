@@ -15,7 +15,7 @@ export const vehicle = (over: Partial<Vehicle> = {}): Vehicle => ({
   heading_deg: 0, roll_deg: 0, pitch_deg: 0, mode: 'GUIDED', armed: true, landed: 'in_air', battery_percent: 80, battery_v: 15.2,
   fix: { kind: '3d', satellites: 14, horizontal_sigma_m: 0.8 }, estimator_ok: true, ready_to_arm: true, boot_s: 100,
   activity: { kind: 'holding', settled: true, slot_error_m: null, reason: null }, plan_generation: 3, home: null, touchdown: null,
-  acceleration: null, range_m: null, link: null, firmware: null,
+  acceleration: null, range_m: null, link: null, firmware: null, has_payload: false,
   ages: { mode_s: 0.1, attitude_s: 0.1, landed_s: 0.1, battery_s: 0.5, fix_s: 0.2, estimator_s: 0.2, home_s: 1 },
   ...over,
 });
@@ -30,8 +30,8 @@ export const sea = (over: Partial<SeaState> = {}): SeaState => ({
 
 export const mission = (over: Partial<Mission> = {}): Mission => ({
   id: 'm-1', name: 'North bay', stamp: stamp(0), age_s: 0, point: place, survey_height_m: 5, approval: 'manual', dispatch_on_approval: true,
-  phase: 'waiting', leader: null, follower: null, verdict: null, h_s_m: null, touchdown: null, touchdown_error_m: null, history: [],
-  can: { approve: no, dispatch: no, pause: no, resume: no, abort: no },
+  phase: 'waiting', leader: null, follower: null, verdict: null, h_s_m: null, touchdown: null, touchdown_error_m: null, release_problem: null, history: [],
+  can: { approve: no, dispatch: no, pause: no, resume: no, abort: no, release: no, skip_release: no },
   ...over,
 });
 

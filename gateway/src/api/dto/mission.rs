@@ -56,6 +56,8 @@ pub enum MissionPhase {
     Clearing,
     /// The follower approaches, descends and lands.
     Landing,
+    /// The follower has landed, and lets its payload go; or a person must choose, since it didn't.
+    Releasing,
     /// Paused by a person: all hold.
     Paused,
     /// The follower landed.
@@ -77,6 +79,7 @@ impl From<model::MissionPhase> for MissionPhase {
             model::MissionPhase::Joining => Self::Joining,
             model::MissionPhase::Clearing => Self::Clearing,
             model::MissionPhase::Landing => Self::Landing,
+            model::MissionPhase::Releasing => Self::Releasing,
             model::MissionPhase::Paused => Self::Paused,
             model::MissionPhase::Completed => Self::Completed,
             model::MissionPhase::Aborted => Self::Aborted,
@@ -137,6 +140,10 @@ pub struct MissionAbilities {
     pub resume: Possibility,
     /// Let everyone return.
     pub abort: Possibility,
+    /// Try once more to let the payload go.
+    pub release: Possibility,
+    /// Complete the mission though the payload was not let go.
+    pub skip_release: Possibility,
 }
 
 /// A mission: survey one point, assess it, send one follower to land there.
@@ -178,6 +185,9 @@ pub struct Mission {
     /// Distance of that from the point, metres.
     #[schema(required = true)]
     pub touchdown_error_m: Option<f64>,
+    /// Why the payload was not let go, if it was to be.
+    #[schema(required = true)]
+    pub release_problem: Option<String>,
     /// Every transition, oldest first.
     pub history: Vec<MissionTransition>,
     /// What can be done now.
@@ -208,6 +218,7 @@ impl Mission {
             h_s_m: mission.h_s_m.map(Into::into),
             touchdown: mission.touchdown.map(|point| edge.point(point)),
             touchdown_error_m: mission.touchdown.map(|point| point.distance_m(&spec.point)),
+            release_problem: mission.release_problem.clone(),
             history: mission.history.iter().map(Into::into).collect(),
             can: MissionAbilities {
                 approve: can::approve(mission).into(),
@@ -215,6 +226,8 @@ impl Mission {
                 pause: can::pause(mission).into(),
                 resume: can::resume(mission).into(),
                 abort: can::abort(mission).into(),
+                release: can::release(mission).into(),
+                skip_release: can::release(mission).into(),
             },
         }
     }

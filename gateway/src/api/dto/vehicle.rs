@@ -365,6 +365,8 @@ pub struct Vehicle {
     /// What flies it; `null` until it says.
     #[schema(required = true)]
     pub firmware: Option<Firmware>,
+    /// It carries something that it can let go.
+    pub has_payload: bool,
 }
 
 impl Vehicle {
@@ -407,6 +409,7 @@ impl Vehicle {
             ages: state.ages.into(),
             link: state.link.map(Into::into),
             firmware: state.firmware.as_ref().map(Into::into),
+            has_payload: state.has_payload,
         }
     }
 }

@@ -78,6 +78,16 @@ enum Command {
         /// Its id
         id: String,
     },
+    /// Try once more to let the payload go
+    Release {
+        /// Its id
+        id: String,
+    },
+    /// Complete the mission with the payload still held
+    SkipRelease {
+        /// Its id
+        id: String,
+    },
     /// Follow a mission until it ends; exit code 0 if it completed
     Watch {
         /// Its id
@@ -130,6 +140,8 @@ async fn command(client: &Client, command: Command, json: bool) -> anyhow::Resul
         Command::Pause { id } => ("pause", id),
         Command::Resume { id } => ("resume", id),
         Command::Abort { id } => ("abort", id),
+        Command::Release { id } => ("release", id),
+        Command::SkipRelease { id } => ("skip-release", id),
     };
     let answer = client.send(Method::POST, &path(&id, verb)?, None).await?;
     if json {

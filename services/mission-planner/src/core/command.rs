@@ -9,6 +9,7 @@ use super::flow::Step;
 use super::live::Live;
 use super::planner::{Planner, enter};
 use super::record::{Effects, Record};
+use super::release::landed;
 
 /// Characters of a name of a mission or of a person.
 const NAME_MAX: usize = 128;
@@ -42,7 +43,9 @@ impl Planner {
                     | MissionAction::Dispatch(id)
                     | MissionAction::Pause(id)
                     | MissionAction::Resume(id)
-                    | MissionAction::Abort(id) => Some(id.clone()),
+                    | MissionAction::Abort(id)
+                    | MissionAction::Release(id)
+                    | MissionAction::SkipRelease(id) => Some(id.clone()),
                     MissionAction::Form(_) | MissionAction::Disband(_) => None,
                 };
                 CommandReply { mission, ..CommandReply::accepted(now, reason) }
@@ -88,6 +91,8 @@ impl Planner {
                     Done(format!("mission {id} is aborted"))
                 })
             }
+            MissionAction::Release(id) => self.on_live(id, |_, live| release(live, who, now, effects)),
+            MissionAction::SkipRelease(id) => self.on_live(id, |_, live| skip_release(live, who, now, effects)),
             MissionAction::Form(spec) => self.form(spec, who, now, effects).map_or_else(Refused, Done),
             MissionAction::Disband(leader) => match self.disband(leader, who, now, effects) {
                 Some(count) => Done(format!("{count} followers of {leader} return")),
@@ -194,7 +199,7 @@ impl Planner {
                 Done(format!("mission {id} is dispatched"))
             }
             MissionPhase::Approved => Done(format!("mission {id} is {}", if dispatch { "dispatched" } else { "approved" })),
-            MissionPhase::Joining | MissionPhase::Clearing | MissionPhase::Landing => {
+            MissionPhase::Joining | MissionPhase::Clearing | MissionPhase::Landing | MissionPhase::Releasing => {
                 Done(format!("mission {id} is {}", if dispatch { "dispatched" } else { "approved" }))
             }
             phase => {
@@ -226,6 +231,41 @@ fn resume(live: &mut Live, who: &str, now: Stamp, effects: &mut Effects) -> Outc
     };
     enter(live, (phase, "resumed".into()), who, now, effects);
     Done(format!("mission {id} goes on"))
+}
+
+/// Once more, after a refusal or no answer.
+fn release(live: &mut Live, who: &str, now: Stamp, effects: &mut Effects) -> Outcome {
+    let id = live.mission.id.clone();
+    if let Some(reason) = no_release(live) {
+        return Refused(reason);
+    }
+    if live.mission.release_problem.is_some() {
+        if live.mission.history.len() >= HISTORY_MAX {
+            return Refused(format!("mission {id} has been through {HISTORY_MAX} steps; the release can only be skipped"));
+        }
+        live.mission.release_problem = None;
+        enter(live, (MissionPhase::Releasing, "release again".into()), who, now, effects);
+    }
+    Done(format!("mission {id} lets its payload go"))
+}
+
+/// Completed all the same; that the payload is still held stays on record.
+fn skip_release(live: &mut Live, who: &str, now: Stamp, effects: &mut Effects) -> Outcome {
+    let id = live.mission.id.clone();
+    if let Some(reason) = no_release(live) {
+        return Refused(reason);
+    }
+    let Some(problem) = live.mission.release_problem.clone() else {
+        return Refused(format!("mission {id} still waits for the payload's answer"));
+    };
+    let why = format!("{}; the payload was not released ({problem}), and that was skipped", landed(live));
+    enter(live, (MissionPhase::Completed, why), who, now, effects);
+    Done(format!("mission {id} is completed with its payload held"))
+}
+
+fn no_release(live: &Live) -> Option<String> {
+    let phase = live.mission.phase;
+    (phase != MissionPhase::Releasing).then(|| format!("mission {} is {}, not releasing", live.mission.id, phase_name(phase)))
 }
 
 /// A phase in words.

@@ -9,6 +9,7 @@ use halcyon_model::{MissionPhase, Role, VehicleId, VerdictState};
 
 use super::geometry;
 use super::live::{Live, World};
+use super::release::{landed, releasing};
 use super::waters::failed_checks;
 
 /// The phase to enter next, and why.
@@ -25,6 +26,7 @@ pub(super) fn advance(live: &mut Live, world: &World<'_>, taken: &BTreeSet<Vehic
         MissionPhase::Joining => joining(live, world, taken),
         MissionPhase::Clearing => clearing(live, world),
         MissionPhase::Landing => landing(live, world),
+        MissionPhase::Releasing => releasing(live, world),
         MissionPhase::Paused => overdue(live, world, world.config.paused_max_s, "nobody resumed it"),
         MissionPhase::Completed | MissionPhase::Aborted | MissionPhase::Failed => None,
     }
@@ -35,7 +37,7 @@ fn failed(why: impl Into<String>) -> Option<Step> {
 }
 
 /// Fails a phase that has lasted too long.
-fn overdue(live: &Live, world: &World<'_>, limit_s: f64, what: &str) -> Option<Step> {
+pub(super) fn overdue(live: &Live, world: &World<'_>, limit_s: f64, what: &str) -> Option<Step> {
     (world.now.seconds_since(live.entered) > limit_s).then(|| (MissionPhase::Failed, format!("{what} within {limit_s:.0} s")))
 }
 
@@ -257,13 +259,14 @@ fn airborne_follower_fault(live: &Live, world: &World<'_>) -> Option<String> {
 }
 
 fn landing(live: &mut Live, world: &World<'_>) -> Option<Step> {
-    if let Some(touchdown) = live.follower_landed(world).and_then(|state| state.touchdown) {
+    let down = live.follower_landed(world).and_then(|state| Some((state.touchdown?, state.has_payload)));
+    if let Some((touchdown, has_payload)) = down {
         let miss_m = touchdown.distance_m(&live.spot());
         live.mission.touchdown = Some(touchdown);
-        return Some(if miss_m <= world.config.touchdown_error_max_m {
-            (MissionPhase::Completed, format!("the follower landed {miss_m:.2} m from the spot"))
-        } else {
+        return Some(if miss_m > world.config.touchdown_error_max_m {
             (MissionPhase::Failed, format!("the follower came down {miss_m:.0} m from the spot"))
+        } else {
+            (if has_payload { MissionPhase::Releasing } else { MissionPhase::Completed }, landed(live))
         });
     }
     airborne_leader_fault(live, world)

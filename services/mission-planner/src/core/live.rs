@@ -11,6 +11,7 @@ use super::fleet::Fleet;
 use super::formation::Formations;
 use super::geometry;
 use super::record::Course;
+use super::release::Request;
 use super::waters::Waters;
 use crate::config::Config;
 
@@ -46,6 +47,10 @@ pub(super) struct Live {
     pub(super) recovered: bool,
     /// Whether the last plan cleared the follower to descend.
     pub(super) was_cleared: bool,
+    /// The request to let the payload go that was made in the present phase.
+    pub(super) release: Option<Request>,
+    /// Requests made so far, since the planner runs.
+    pub(super) release_attempts: u32,
     /// What the mission last said it was waiting for, and when.
     pub(super) note: Option<(String, Stamp)>,
     /// What it waits for now.
@@ -64,6 +69,7 @@ impl Live {
             verdict: None,
             h_s_m: None,
             touchdown: None,
+            release_problem: None,
             history: Vec::new(),
         };
         Self::with(mission, Course::default(), now)
@@ -84,6 +90,8 @@ impl Live {
             dropped: Vec::new(),
             recovered: false,
             was_cleared: false,
+            release: None,
+            release_attempts: 0,
             note: None,
             waits_for: None,
         }
@@ -99,6 +107,7 @@ impl Live {
         self.entered = now;
         self.task_generation = None;
         self.unsafe_since = None;
+        self.release = None;
         self.note = None;
         transition
     }

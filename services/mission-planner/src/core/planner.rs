@@ -13,6 +13,7 @@ use super::formation::{self, Formation, Formations};
 use super::homing::Homings;
 use super::live::{Live, World};
 use super::record::{Effects, Notice, Record, Saved};
+use super::release;
 use super::tasks;
 use super::waters::Waters;
 use crate::config::Config;
@@ -22,7 +23,7 @@ const GENERATIONS_RESERVED: u64 = 1000;
 /// A vehicle that claims a greater generation is not believed; the planner could never get past it.
 const GENERATION_MAX: u64 = 1 << 60;
 /// Transitions that a mission may go through at one moment: as many as there are phases.
-const STEPS_MAX: usize = 12;
+const STEPS_MAX: usize = 13;
 /// Missions that are announced again after a restart, besides those under way.
 const ANNOUNCED_MAX: usize = 200;
 /// Who the planner is in a mission's history.
@@ -112,6 +113,14 @@ impl Planner {
         self.waters.observe(sea, now, &self.config)
     }
 
+    /// Takes in a vehicle's answer to request number `attempt` to let its payload go: done, or why not.
+    pub fn observe_release(&mut self, mission: &MissionId, attempt: u32, answer: Result<(), String>, now: Stamp) -> Effects {
+        if let Some(live) = self.live.iter_mut().find(|live| live.mission.id == *mission) {
+            release::answered(live, attempt, answer);
+        }
+        self.step(now)
+    }
+
     pub(super) fn world(&self, now: Stamp) -> World<'_> {
         World { config: &self.config, fleet: &self.fleet, formations: &self.formations, waters: &self.waters, now }
     }
@@ -149,6 +158,7 @@ impl Planner {
         if live.mission.phase.is_final() {
             return;
         }
+        effects.releases.extend(release::due(live, &world));
         if let Some(verdict) = live.sea(&world).map(|sea| sea.verdict.state)
             && live.mission.verdict != Some(verdict)
         {
@@ -309,6 +319,7 @@ pub(super) fn enter(live: &mut Live, step: flow::Step, who: &str, now: Stamp, ef
     announce(&live.mission, effects);
     let severity = match phase {
         MissionPhase::Failed | MissionPhase::Aborted => Severity::Warning,
+        MissionPhase::Releasing if live.mission.release_problem.is_some() => Severity::Warning,
         _ => Severity::Info,
     };
     effects.notices.push(notice(severity, &format!("mission {}", phase.as_str()), format!("{who}: {why}"), &live.mission));

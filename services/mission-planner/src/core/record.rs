@@ -105,6 +105,21 @@ pub struct Notice {
     pub mission: Option<MissionId>,
 }
 
+/// Ask a vehicle to let its payload go, and tell the planner the answer by [`super::Planner::observe_release`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReleaseOrder {
+    /// For which mission.
+    pub mission: MissionId,
+    /// Whom.
+    pub vehicle: VehicleId,
+    /// Which request of the mission's this is, to know its answer by.
+    pub attempt: u32,
+    /// Now.
+    pub stamp: Stamp,
+    /// After this no answer is waited for, and it must not be carried out.
+    pub deadline: Stamp,
+}
+
 /// What came of a step or a command. Store `records` first, all or none; announce the rest only then.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[must_use]
@@ -117,4 +132,6 @@ pub struct Effects {
     pub missions: Vec<Mission>,
     /// Events.
     pub notices: Vec<Notice>,
+    /// Payloads to let go.
+    pub releases: Vec<ReleaseOrder>,
 }

@@ -33,8 +33,12 @@ pub(super) fn assignments(live: &Live, world: &World<'_>) -> Vec<Assignment> {
         MissionPhase::Joining => (survey(live.spot()), Some(follow(leader))),
         MissionPhase::Clearing => (survey(live.stand_off(config)), Some(follow(leader))),
         MissionPhase::Landing => (survey(live.stand_off(config)), Some(land(clearance(live, world)))),
+        // On the water it stays, its task still the landing, so that a release of its own goes on, too; the leader has nothing more to do.
+        MissionPhase::Releasing => (Task::Return, Some(land(None))),
         // Halfway down is no place to hold: a follower over the spot climbs to the approach height and waits there.
-        MissionPhase::Paused if live.course.paused_from == Some(MissionPhase::Landing) => (Task::Hold, Some(land(None))),
+        MissionPhase::Paused if matches!(live.course.paused_from, Some(MissionPhase::Landing | MissionPhase::Releasing)) => {
+            (Task::Hold, Some(land(None)))
+        }
         MissionPhase::Paused => (Task::Hold, Some(Task::Hold)),
     };
     let follower = live.mission.follower.iter().zip(follower_task);

@@ -20,7 +20,9 @@ pub use thread::StoreThread;
 /// `HALC`: marks the file as ours.
 const APPLICATION_ID: i32 = 0x4841_4C43;
 /// The schema that this build writes.
-const SCHEMA_VERSION: i32 = 2;
+const SCHEMA_VERSION: i32 = 3;
+/// What versions 2 and 3 added.
+const ADDED: [&str; 2] = [include_str!("formation.sql"), include_str!("release.sql")];
 /// How long to wait for another planner to let go of the file; a planner that is restarted in place needs a moment.
 const LOCK_WAIT: Duration = Duration::from_secs(3);
 
@@ -144,14 +146,14 @@ impl Store {
                 .execute_batch(&format!(
                     "BEGIN; {} {} PRAGMA application_id = {APPLICATION_ID}; PRAGMA user_version = {SCHEMA_VERSION}; COMMIT;",
                     include_str!("schema.sql"),
-                    include_str!("formation.sql"),
+                    ADDED.concat(),
                 ))
                 .map_err(|source| StoreError::Write { path: path(), source }),
-            (APPLICATION_ID, 1) => self
+            (APPLICATION_ID, old @ 1..SCHEMA_VERSION) => self
                 .connection
                 .execute_batch(&format!(
                     "BEGIN; {} PRAGMA user_version = {SCHEMA_VERSION}; COMMIT;",
-                    include_str!("formation.sql"),
+                    ADDED.get(old as usize - 1..).unwrap_or_default().concat(),
                 ))
                 .map_err(|source| StoreError::Write { path: path(), source }),
             (APPLICATION_ID, SCHEMA_VERSION) => Ok(()),

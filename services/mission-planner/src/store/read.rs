@@ -97,6 +97,7 @@ fn mission(row: &Row<'_>) -> rusqlite::Result<SavedMission> {
         verdict: None,
         h_s_m: None,
         touchdown: None,
+        release_problem: None,
         history: Vec::new(),
     };
     Ok(SavedMission { mission, course: Course::default(), crew: Vec::new() })
@@ -121,6 +122,7 @@ fn enter(saved: &mut SavedMission, row: &Row<'_>) -> rusqlite::Result<()> {
         (Some(north_m), Some(east_m)) => Some(LocalPoint::new(north_m, east_m)),
         _ => None,
     };
+    mission.release_problem = row.get("release_problem")?;
     mission.history.push(Transition { stamp: at, phase, who: row.get("who")?, why: row.get("why")? });
     saved.course = Course {
         paused_from: word(row, "paused_from", MissionPhase::from_name)?,

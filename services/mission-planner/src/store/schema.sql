@@ -1,4 +1,4 @@
--- The mission store, version 1; version 2 adds formation.sql. Lines are only ever added: the triggers refuse anything else.
+-- The mission store, version 1; version 2 adds formation.sql, version 3 release.sql. Lines are only ever added: the triggers refuse anything else.
 CREATE TABLE mission (
     seq INTEGER PRIMARY KEY AUTOINCREMENT,
     id TEXT NOT NULL UNIQUE,

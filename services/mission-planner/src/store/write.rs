@@ -64,10 +64,10 @@ fn entered(transaction: &Transaction<'_>, mission: &Mission, course: &Course, st
     transaction.execute(
         "INSERT INTO transition (mission, stamp_ns, phase, who, why, leader, follower, verdict, h_s_m, h_s_m_low, h_s_m_high,
              touchdown_north_m, touchdown_east_m, paused_from, heading_rad, abreast_m, dispatch, reached_landing,
-             station_since_ns, first_on_station_ns)
+             station_since_ns, first_on_station_ns, release_problem)
          VALUES (:mission, :stamp_ns, :phase, :who, :why, :leader, :follower, :verdict, :h_s_m, :h_s_m_low, :h_s_m_high,
              :touchdown_north_m, :touchdown_east_m, :paused_from, :heading_rad, :abreast_m, :dispatch, :reached_landing,
-             :station_since_ns, :first_on_station_ns)",
+             :station_since_ns, :first_on_station_ns, :release_problem)",
         named_params! {
             ":mission": mission.id.as_str(),
             ":stamp_ns": step.stamp.as_nanos(),
@@ -89,6 +89,7 @@ fn entered(transaction: &Transaction<'_>, mission: &Mission, course: &Course, st
             ":reached_landing": course.reached_landing,
             ":station_since_ns": course.station_since.map(Stamp::as_nanos),
             ":first_on_station_ns": course.first_on_station.map(Stamp::as_nanos),
+            ":release_problem": mission.release_problem,
         },
     )?;
     Ok(())

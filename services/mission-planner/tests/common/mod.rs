@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use halcyon_mission_planner::Config;
-use halcyon_mission_planner::core::{Effects, Notice, Planner, Record};
+use halcyon_mission_planner::core::{Effects, Notice, Planner, Record, ReleaseOrder};
 use halcyon_mission_planner::store::Store;
 use halcyon_model::{
     Approval, CalmForecast, CommandReply, Estimate, LocalPoint, Mission, MissionAction, MissionCommand, MissionId,
@@ -44,6 +44,12 @@ pub struct World {
     pub plans: u64,
     /// Least distance between any two vehicles in the air, metres.
     pub least_separation_m: f64,
+    /// What vehicles answer when they are to let their payload go, a second later; `None`: nothing.
+    pub release: Option<Result<(), String>>,
+    /// Every order to let a payload go.
+    pub orders: Vec<ReleaseOrder>,
+    /// Of these, still to be answered.
+    unanswered: Vec<ReleaseOrder>,
 }
 
 pub fn id(text: &str) -> VehicleId {
@@ -107,6 +113,9 @@ impl World {
             plan: None,
             plans: 0,
             least_separation_m: f64::INFINITY,
+            release: Some(Ok(())),
+            orders: Vec::new(),
+            unanswered: Vec::new(),
         };
         world.take(effects);
         world.run(0.4);
@@ -211,6 +220,19 @@ impl World {
         }
         self.assess();
         self.step_planner();
+        self.answer_releases();
+    }
+
+    fn answer_releases(&mut self) {
+        let Some(answer) = self.release.clone() else { return };
+        let due = |order: &ReleaseOrder| self.now.seconds_since(order.stamp) >= 1.0;
+        let (due, later) = std::mem::take(&mut self.unanswered).into_iter().partition(due);
+        self.unanswered = later;
+        let due: Vec<ReleaseOrder> = due;
+        for order in due {
+            let effects = self.planner.observe_release(&order.mission, order.attempt, answer.clone(), self.now);
+            self.take(effects);
+        }
     }
 
     fn measure_separation(&mut self) {
@@ -260,6 +282,13 @@ impl World {
             self.missions.push(mission);
         }
         self.notices.extend(effects.notices);
+        for order in effects.releases {
+            let vehicle = self.vehicles.iter().find(|vehicle| vehicle.id == order.vehicle).unwrap();
+            assert!(vehicle.has_payload && !vehicle.airborne(), "{order:?}");
+            assert!(order.stamp == self.now && order.deadline > self.now);
+            self.orders.push(order.clone());
+            self.unanswered.push(order);
+        }
         if let Some(plan) = effects.plan {
             self.check_plan(&plan);
             self.plan = Some(plan);
@@ -325,6 +354,8 @@ impl World {
     /// Ends the planner as a crash would, and starts a new one from the store after `away_s`.
     pub fn restart(&mut self, away_s: f64) {
         drop(self.store.take());
+        // Whoever waited for an answer is gone.
+        self.unanswered.clear();
         let until = self.now.plus_secs_f64(away_s);
         while self.now < until {
             self.now = self.now.plus_secs_f64(STEP_S);

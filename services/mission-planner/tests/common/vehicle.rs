@@ -30,6 +30,7 @@ pub struct FakeVehicle {
     /// It knows where its home is.
     pub home_known: bool,
     pub touchdown: Option<LocalPoint>,
+    pub has_payload: bool,
     /// Says nothing and hears nothing.
     pub silent: bool,
     /// Does not move.
@@ -60,6 +61,7 @@ impl FakeVehicle {
             ready: true,
             home_known: true,
             touchdown: None,
+            has_payload: false,
             silent: false,
             stuck: false,
             seized: None,
@@ -251,6 +253,7 @@ impl FakeVehicle {
             ages: halcyon_model::Ages::default(),
             link: None,
             firmware: None,
+            has_payload: self.has_payload,
         }
     }
 }

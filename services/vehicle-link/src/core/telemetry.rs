@@ -303,7 +303,7 @@ impl Telemetry {
         }
     }
 
-    /// The state at `now`; `None` until mode, position and attitude have been heard. Activity, plan and touchdown are the
+    /// The state at `now`; `None` until mode, position and attitude have been heard. Activity, plan, touchdown and payload are the
     /// executor's to fill in.
     #[must_use]
     pub fn state(&self, now: Stamp) -> Option<VehicleState> {
@@ -357,6 +357,7 @@ impl Telemetry {
             },
             link: None,
             firmware: None,
+            has_payload: false,
         })
     }
 }

@@ -244,6 +244,7 @@ pub(super) mod tests {
             ages: halcyon_model::Ages::default(),
             link: None,
             firmware: None,
+            has_payload: false,
         }
     }
 

@@ -24,6 +24,10 @@ function look(mission: Mission, action: MissionAction): Look {
       return { label: 'Pause', kind: 'plain' };
     case 'resume':
       return { label: 'Resume', kind: 'primary' };
+    case 'release':
+      return { label: 'Release again', kind: 'primary' };
+    case 'skip_release':
+      return { label: 'Go on without', kind: 'plain', confirmLabel: 'Yes, complete', question: `Complete ${mission.name} with the payload still held by ${who}? It was not released: ${mission.release_problem ?? 'no reason given'}.` };
     case 'abort':
       return { label: 'Abort', kind: 'danger', icon: 'cross', confirmLabel: 'Yes, abort', question: `Abort ${mission.name}? Every vehicle in the air flies home.` };
   }

@@ -25,7 +25,8 @@ export const canCreate = (live: boolean): Possibility => (live ? yes : no('Not c
 
 /** What sends the mission on: shown, though disabled, from the start, so that a person knows that it will be asked for. */
 function forward(mission: Mission): MissionAction[] {
-  const { approve, dispatch } = mission.can;
+  const { approve, dispatch, release } = mission.can;
+  if (release.allowed) return ['release', 'skip_release'];
   if (approve.allowed) return ['approve'];
   if (dispatch.allowed) return ['dispatch'];
   return mission.approval === 'manual' && BEFORE_APPROVAL.includes(mission.phase) ? ['approve'] : [];

@@ -32,6 +32,10 @@ describe('buttons', () => {
   it('approval is announced from the start, and gone once given', () => {
     expect(offered(mission({ phase: 'assessing' }))).toEqual(['approve', 'pause', 'abort']);
     expect(offered(mission({ phase: 'landing' }))).toEqual(['pause', 'abort']);
+    const allowed = { allowed: true, why: '' };
+    const held = mission({ phase: 'releasing', release_problem: 'refused' });
+    expect(offered({ ...held, can: { ...held.can, release: allowed, skip_release: allowed } })).toEqual(['release', 'skip_release', 'pause', 'abort']);
+    expect(offered(held)).toEqual(['pause', 'abort']);
     expect(offered(mission({ phase: 'assessing', approval: 'automatic' }))).toEqual(['pause', 'abort']);
   });
   it('dispatch replaces approve once only that is left', () => {

@@ -12,7 +12,7 @@ const STEPS: readonly { label: string; phases: readonly MissionPhase[] }[] = [
   { label: 'Approve', phases: ['awaiting_approval', 'approved'] },
   { label: 'Join', phases: ['joining'] },
   { label: 'Clear', phases: ['clearing'] },
-  { label: 'Land', phases: ['landing'] },
+  { label: 'Land', phases: ['landing', 'releasing'] },
 ];
 
 /** What each phase means, for people. */
@@ -25,6 +25,7 @@ export const PHASE_TEXT: Record<MissionPhase, string> = {
   joining: 'Follower joins the leader',
   clearing: 'Leader clears the spot',
   landing: 'Follower is landing',
+  releasing: 'Payload is let go',
   paused: 'Paused: all hold',
   completed: 'Follower has landed',
   aborted: 'Aborted: all return',

@@ -282,6 +282,7 @@ impl Executor {
         state.activity = self.activity.clone();
         state.plan_generation = self.plan_generation();
         state.touchdown = self.touchdown;
+        state.has_payload = self.config.payload.command(true).is_some();
         let in_force = |intent: &Intent| state.stamp.seconds_since(intent.stamp).abs() <= INTENT_S_MAX;
         state.intent = self.intent.filter(|intent| state.mode == FlightMode::Guided && in_force(intent));
     }

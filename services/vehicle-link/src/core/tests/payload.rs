@@ -26,6 +26,12 @@ fn it_is_let_go_on_the_ground_only_and_only_if_there_is_one() {
     let mut none = World::new(&[(0.0, 0.0)]);
     none.run(0.5, |_| {});
     refused(&none.command(0, VehicleAction::ReleasePayload), "no payload");
+    let says_so = |world: &World| {
+        let mut state = world.copters[0].state(world.now);
+        world.executors[0].complete(&mut state);
+        state.has_payload
+    };
+    assert!(!says_so(&none) && says_so(&with_payload(false)));
 
     let mut world = with_payload(false);
     world.run(0.5, |_| {});

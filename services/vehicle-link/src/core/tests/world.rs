@@ -165,6 +165,7 @@ impl Copter {
             ages: halcyon_model::Ages::default(),
             link: None,
             firmware: None,
+            has_payload: false,
         }
     }
 }

@@ -172,6 +172,7 @@ impl Craft {
             ages: Ages::default(),
             link: None,
             firmware: None,
+            has_payload: false,
         }
     }
 }
