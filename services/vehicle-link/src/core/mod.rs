@@ -24,6 +24,7 @@ pub mod loss;
 pub mod mode;
 pub mod motion;
 pub mod observer;
+mod owed;
 pub mod parameters;
 pub mod payload;
 pub mod px4;
@@ -37,6 +38,7 @@ pub mod text;
 pub mod timesync;
 pub mod track;
 pub mod transfers;
+pub mod unlisted;
 pub mod version;
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ use halcyon_model::{Content, Item, ItemFrame, ItemKind, Parameter, ParameterKind
 use halcyon_vehicle_link::core::commands::Effect;
 use halcyon_vehicle_link::core::encode::Address;
 use halcyon_vehicle_link::core::transfers::{Ending, Request, TransferError, Transfers};
+use halcyon_vehicle_link::core::unlisted::Unlisted;
 use mavlink::dialects::ardupilotmega as ardu;
 use mavlink::dialects::ardupilotmega::{MavAutopilot, MavCmd, MavFrame, MavMessage, MavMissionType, MavParamType};
 use proptest::prelude::*;
@@ -335,6 +336,33 @@ fn px4s_integers_go_by_their_bytes() {
     assert_eq!(read[0].value, -2.0);
     assert!(bench.run(Request::Set(name("SYS_ID"), 77.0), 60.0).0.is_ok());
     assert_eq!(bench.script.parameters[1].1.to_bits(), 77);
+}
+
+/// MAVLink may get errors that the dialect has not; one for another client is not ours.
+#[test]
+fn an_error_that_is_not_known_ends_it_with_its_number() {
+    for request in [Request::Read(name("P_1")), Request::Set(name("P_1"), 1.0)] {
+        let mut transfers = Transfers::default();
+        transfers.submit(1, request, t(60.0)).unwrap();
+        transfers.poll(to(), t(0.0));
+        let error = |param: &str, target_component| {
+            let data = ardu::PARAM_ERROR_DATA {
+                param_index: -1,
+                target_system: 7,
+                target_component,
+                param_id: param.into(),
+                ..Default::default()
+            };
+            Unlisted::ParamError(data, 42)
+        };
+        assert!(!transfers.observe_unlisted(&error("P_1", 190), (7, 191)));
+        transfers.observe_unlisted(&error("P_2", 191), (7, 191));
+        assert!(transfers.poll(to(), t(0.1)).is_empty());
+        assert!(transfers.observe_unlisted(&error("P_1", 191), (7, 191)));
+        let effects = transfers.poll(to(), t(0.2));
+        let [Effect::Transferred(1, Err(error))] = &effects[..] else { panic!("{effects:?}") };
+        assert_eq!(error.to_string(), "the autopilot refused P_1: error 42, which is not known here");
+    }
 }
 
 #[test]

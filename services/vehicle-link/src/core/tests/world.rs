@@ -64,7 +64,10 @@ impl Copter {
     }
 
     fn take(&mut self, command: Command) -> Result<(), crate::core::commands::CommandError> {
-        let no = |result| Err(crate::core::commands::CommandError::Refused { result, words: None });
+        let no = |result| {
+            let result = crate::core::commands::Refusal::Listed(result);
+            Err(crate::core::commands::CommandError::Refused { result, words: None })
+        };
         match command {
             Command::Arm if self.ready && self.mode == FlightMode::Guided => self.armed = true,
             Command::Disarm { force } if force || self.on_ground() && self.finds_ground => self.armed = false,
