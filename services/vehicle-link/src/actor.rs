@@ -227,6 +227,10 @@ impl<'a> Service<'a> {
         }
         let effects = self.autopilot.poll(now);
         self.carry_out(effects, link).await;
+        if let Some(slow) = self.autopilot.slow_streams() {
+            let why = format!("{slow}; asked for again (a ground station may have lowered it, or the link is too slow)");
+            self.event(EventDraft::warning("telemetry comes less often than asked for", why)).await;
+        }
         self.tell_progress(now).await;
         self.report(now, link);
     }

@@ -259,6 +259,11 @@ impl Autopilot {
         self.transfers.progress()
     }
 
+    /// Which streams come less often than was asked for, in words; once.
+    pub fn slow_streams(&mut self) -> Option<String> {
+        self.streams.complaint()
+    }
+
     /// The autopilot started again: its streams are asked for afresh, and its local frame is another.
     pub fn started_again(&mut self) {
         self.local = LocalFinder::default();
@@ -270,7 +275,7 @@ impl Autopilot {
     pub fn poll(&mut self, now: Stamp) -> Vec<Effect> {
         let Some(address) = self.address else { return Vec::new() };
         let family = self.identity.family();
-        for stream in self.streams.due(now).into_iter().filter(|stream| stream.suits(family)) {
+        for stream in self.streams.due(self.loss.share(), now).into_iter().filter(|stream| stream.suits(family)) {
             // A full line is tried again with the next retry of the stream.
             let _ = self.commands.submit(0, Command::SetInterval(stream));
         }
