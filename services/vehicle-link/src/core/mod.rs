@@ -28,6 +28,7 @@ mod owed;
 pub mod parameters;
 pub mod payload;
 pub mod px4;
+pub mod renames;
 pub mod separation;
 pub mod signing;
 pub mod station;

@@ -18,6 +18,7 @@ use super::commands::{Effect, Ticket};
 use super::encode::Address;
 use super::items::{Clear, Download, Upload};
 use super::parameters::{Encoding, ReadAll, ReadOne, SetOne};
+use super::renames;
 use super::unlisted::Unlisted;
 
 /// Transfers that wait; more are refused.
@@ -72,7 +73,7 @@ pub enum ParameterRefusal {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TransferError {
     /// It answers for others, not for this one.
-    #[error("the autopilot knows no parameter {0}")]
+    #[error("the autopilot knows no parameter {name}{hint}", name = .0, hint = renames::hint(.0))]
     NoSuchParameter(ParameterName),
     /// It said why not.
     #[error("the autopilot refused {name}: {why}")]

@@ -370,9 +370,30 @@ fn an_unknown_name_is_told_from_silence() {
     for says_errors in [true, false] {
         let mut script = with_parameters(ARDU, 5);
         script.says_errors = says_errors;
-        let (ending, _) = Bench::new(script, 0.0, 1).run(Request::Read(name("NONE")), 60.0);
+        let mut bench = Bench::new(script, 0.0, 1);
+        let (ending, took_s) = bench.run(Request::Read(name("NONE")), 60.0);
         assert_eq!(ending.unwrap_err().to_string(), "the autopilot knows no parameter NONE");
+        // ArduPilot 4.7 says so; before that it says nothing, and another one's answer must tell.
+        assert_eq!(took_s < 0.5, says_errors, "{took_s}");
+        let (ending, took_s) = bench.run(Request::Set(name("RTL_ALT"), 1500.0), 60.0);
+        let said = ending.unwrap_err().to_string();
+        assert_eq!(said, "the autopilot knows no parameter RTL_ALT; since ArduPilot 4.7 it is RTL_ALT_M = RTL_ALT / 100");
+        assert_eq!(took_s < 0.5, says_errors, "{took_s}");
     }
+}
+
+/// ArduPilot 4.7 tells an error of a value by PARAM_ERROR, with the value that stays after it or without; one that another client
+/// got for the same parameter is not ours.
+#[test]
+fn a_value_that_is_refused_ends_the_writing_at_once_and_only_ours_does() {
+    let mut bench = Bench::new(with_parameters(ARDU, 3), 0.0, 1);
+    bench.script.denies = Some(1);
+    let (ending, took_s) = bench.run(Request::Set(name("P_1"), 7.0), 60.0);
+    assert_eq!(ending.unwrap_err().to_string(), "the autopilot refused P_1: permission denied");
+    assert!(took_s < 0.5, "{took_s}");
+    bench.script.denies = None;
+    bench.script.denies_another = true;
+    assert_eq!(bench.run(Request::Set(name("P_1"), 7.0), 60.0).0.unwrap().what, "P_1 is 7");
 }
 
 fn read_all(ending: Ending) -> Vec<(String, f64)> {
