@@ -11,6 +11,7 @@ pub mod executor;
 pub mod failsafe;
 pub mod frame;
 pub mod guidance;
+pub mod heed;
 pub mod identity;
 pub mod intent;
 pub mod interlock;
