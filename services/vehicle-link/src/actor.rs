@@ -173,7 +173,13 @@ impl<'a> Service<'a> {
                     self.executor.observe_station(what);
                 }
             }
-            LinkEvent::Unread(header) => self.autopilot.observe_unread(header, self.context.clock.now()),
+            LinkEvent::Unread(header, answer) => {
+                let now = self.context.clock.now();
+                if self.autopilot.observe_unread(header, answer.as_deref(), now) {
+                    let effects = self.autopilot.poll_transfers(now);
+                    self.carry_out(effects, link).await;
+                }
+            }
             LinkEvent::Rejected(verdict) => {
                 let now = self.context.clock.now();
                 if self.rejected.is_none_or(|(at, _)| now.seconds_since(at) > REJECTED_S) {
@@ -212,7 +218,7 @@ impl<'a> Service<'a> {
                     }
                 }
                 Output::Withdraw => {
-                    let ended = self.autopilot.withdraw();
+                    let ended = self.autopilot.withdraw(now);
                     self.carry_out(ended, link).await;
                 }
                 Output::AskStreams => self.autopilot.started_again(),
@@ -221,6 +227,10 @@ impl<'a> Service<'a> {
         }
         let effects = self.autopilot.poll(now);
         self.carry_out(effects, link).await;
+        if let Some(slow) = self.autopilot.slow_streams() {
+            let why = format!("{slow}; asked for again (a ground station may have lowered it, or the link is too slow)");
+            self.event(EventDraft::warning("telemetry comes less often than asked for", why)).await;
+        }
         self.tell_progress(now).await;
         self.report(now, link);
     }

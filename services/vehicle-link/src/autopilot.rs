@@ -6,7 +6,7 @@ use mavlink::dialects::ardupilotmega::{MavAutopilot, MavMessage};
 use mavlink::{MavHeader, Message as _};
 
 use crate::config::Config;
-use crate::core::commands::{Command, CommandError, Commands, Effect, Ticket};
+use crate::core::commands::{Command, CommandError, Commands, Effect, Refusal, Ticket};
 use crate::core::encode::{self, Address, Datum};
 use crate::core::guidance::Setpoint;
 use crate::core::identity::{self, Identity};
@@ -19,6 +19,7 @@ use crate::core::telemetry::Telemetry;
 use crate::core::text::Texts;
 use crate::core::timesync::TimeSync;
 use crate::core::transfers::{Request, TransferError, Transfers};
+use crate::core::unlisted::Unlisted;
 
 /// MAV_COMP_ID_ONBOARD_COMPUTER.
 pub(crate) const OWN_COMPONENT: u8 = 191;
@@ -127,12 +128,17 @@ impl Autopilot {
         heard
     }
 
-    /// A frame of a message that is not known: it counts as received.
-    pub fn observe_unread(&mut self, header: MavHeader, now: Stamp) {
-        let from_it = |address: Address| u32::from(address.system()) == header.system_id;
-        if header.component_id == AUTOPILOT_COMPONENT && self.address.is_some_and(from_it) {
-            self.count(header, now);
-        }
+    /// A frame of a message or a value that is not known: it counts as received. Returns whether a transfer may have something to
+    /// answer, for what it says all the same.
+    pub fn observe_unread(&mut self, header: MavHeader, answer: Option<&Unlisted>, now: Stamp) -> bool {
+        let from_it = |address: &Address| u32::from(address.system()) == header.system_id;
+        let Some(address) = self.address.filter(from_it).filter(|_| header.component_id == AUTOPILOT_COMPONENT) else {
+            return false;
+        };
+        self.count(header, now);
+        let Some(answer) = answer else { return false };
+        self.commands.observe_unlisted(answer, address.system(), OWN_COMPONENT, now);
+        self.transfers.observe_unlisted(answer, (address.system(), OWN_COMPONENT))
     }
 
     fn count(&mut self, header: MavHeader, now: Stamp) {
@@ -195,7 +201,8 @@ impl Autopilot {
         if let Command::SetMode(mode) = command {
             let family = self.identity.family();
             if family.set_mode_parameters(mode).is_none() {
-                return Err(CommandError::Refused { result: "unsupported", words: Some("it has no such mode".into()) });
+                let words = Some("it has no such mode".into());
+                return Err(CommandError::Refused { result: Refusal::Listed("unsupported"), words });
             }
             if family == Family::Px4 && mode == FlightMode::Guided {
                 return self.offboard.want(ticket);
@@ -205,9 +212,9 @@ impl Autopilot {
     }
 
     /// Stops asking for anything that moves the vehicle.
-    pub fn withdraw(&mut self) -> Vec<Effect> {
+    pub fn withdraw(&mut self, now: Stamp) -> Vec<Effect> {
         let mut ended = self.offboard.end(&CommandError::Withdrawn);
-        ended.extend(self.commands.withdraw(self.address, self.telemetry.mode()));
+        ended.extend(self.commands.withdraw(self.address, self.telemetry.mode(), now));
         ended
     }
 
@@ -253,6 +260,11 @@ impl Autopilot {
         self.transfers.progress()
     }
 
+    /// Which streams come less often than was asked for, in words; once.
+    pub fn slow_streams(&mut self) -> Option<String> {
+        self.streams.complaint()
+    }
+
     /// The autopilot started again: its streams are asked for afresh, and its local frame is another.
     pub fn started_again(&mut self) {
         self.local = LocalFinder::default();
@@ -264,7 +276,7 @@ impl Autopilot {
     pub fn poll(&mut self, now: Stamp) -> Vec<Effect> {
         let Some(address) = self.address else { return Vec::new() };
         let family = self.identity.family();
-        for stream in self.streams.due(now).into_iter().filter(|stream| stream.suits(family)) {
+        for stream in self.streams.due(self.loss.share(), now).into_iter().filter(|stream| stream.suits(family)) {
             // A full line is tried again with the next retry of the stream.
             let _ = self.commands.submit(0, Command::SetInterval(stream));
         }
@@ -455,6 +467,31 @@ mod tests {
         autopilot.observe(header, &home(-1_000_000_000), t(9.7));
         autopilot.observe(header, &position(5_000), t(9.7));
         assert!((autopilot.state(t(9.7)).unwrap().0.position_ned_m.z + 5.0).abs() < 1e-9);
+    }
+
+    /// The link hands over what the dialect can't read; answers among it are answers.
+    #[test]
+    fn an_unread_answer_counts_if_it_is_its_own() {
+        let origin = FleetOrigin(halcyon_model::Geodetic::from_deg(53.1, -2.9, 0.0));
+        let mut autopilot = Autopilot::new(&Config::default(), origin, t(0.0)).unwrap();
+        let (header, beat) = heartbeat();
+        autopilot.observe(header, &beat, t(0.0));
+        autopilot.submit(3, Command::Arm).unwrap();
+        autopilot.poll(t(0.0));
+        let ack = ardu::COMMAND_ACK_DATA {
+            command: ardu::MavCmd::MAV_CMD_COMPONENT_ARM_DISARM,
+            target_system: 7,
+            target_component: OWN_COMPONENT,
+            ..Default::default()
+        };
+        let answer = Unlisted::Ack(ack, 11);
+        let refusals = |effects: Vec<Effect>| {
+            effects.iter().filter(|effect| matches!(effect, Effect::Done(3, _, Err(CommandError::Refused { .. })))).count()
+        };
+        autopilot.observe_unread(MavHeader { system_id: 8, ..header }, Some(&answer), t(0.1));
+        assert_eq!(refusals(autopilot.poll(t(0.5))), 0, "another vehicle's");
+        autopilot.observe_unread(header, Some(&answer), t(0.5));
+        assert_eq!(refusals(autopilot.poll(t(0.9))), 1);
     }
 
     #[test]

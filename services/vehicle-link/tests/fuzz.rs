@@ -9,6 +9,7 @@ use halcyon_vehicle_link::Config;
 use halcyon_vehicle_link::autopilot::Autopilot;
 use halcyon_vehicle_link::core::commands::{Command, Effect};
 use halcyon_vehicle_link::core::frame::{Frame, Framer};
+use halcyon_vehicle_link::core::unlisted::Unlisted;
 use mavlink::dialects::ardupilotmega as ardu;
 use mavlink::dialects::ardupilotmega::{MavCmd, MavMessage};
 use mavlink::{MavHeader, MavlinkVersion, Message as _};
@@ -45,7 +46,10 @@ impl Scene {
                     let heard = self.autopilot.observe(frame.header(), &message, self.now);
                     heard.reply.iter().for_each(allowed);
                 }
-                None => self.autopilot.observe_unread(frame.header(), self.now),
+                None => {
+                    let answer = Unlisted::of(&frame);
+                    self.autopilot.observe_unread(frame.header(), answer.as_ref(), self.now);
+                }
             }
         }
     }

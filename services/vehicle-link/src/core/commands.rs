@@ -2,6 +2,8 @@
 //! progress, timeouts, and a typed refusal with the autopilot's own words.
 //!
 //! An acknowledgement names its command and nothing else, so at most one transaction a command id is open; others wait in line.
+//! What was sent twice may be acknowledged twice: an acknowledgement that an ended transaction is still owed is not taken for the
+//! next one's.
 
 use std::collections::VecDeque;
 
@@ -10,10 +12,12 @@ use mavlink::dialects::ardupilotmega as ardu;
 use mavlink::dialects::ardupilotmega::{MavCmd, MavMessage, MavResult};
 
 use super::encode::Address;
+use super::owed::Owed;
 use super::payload::PayloadCommand;
 use super::streams::Stream;
 use super::text::Texts;
 use super::transfers::Ending;
+use super::unlisted::Unlisted;
 
 /// An answer is awaited for so long before the command is sent again, seconds.
 const RETRY_S: f64 = 1.0;
@@ -57,14 +61,25 @@ pub enum Command {
 /// Who asked, to give the outcome back to; the caller's own number.
 pub type Ticket = u64;
 
+/// Why the autopilot refused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum Refusal {
+    /// MAVLink's result, in words.
+    #[error("{0}")]
+    Listed(&'static str),
+    /// A number that MAVLink's results do not have here: whatever it means, the command was not done.
+    #[error("result {0}, which is not known here")]
+    Unlisted(u8),
+}
+
 /// How a command ended.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CommandError {
     /// The autopilot said no.
     #[error("the autopilot refused: {result}{}", .words.as_ref().map(|words| format!(" ({words})")).unwrap_or_default())]
     Refused {
-        /// MAVLink's result, in words.
-        result: &'static str,
+        /// Its result.
+        result: Refusal,
         /// What the autopilot said about it, such as a PreArm message.
         words: Option<String>,
     },
@@ -113,9 +128,13 @@ struct Transaction {
     started: Option<Stamp>,
     tries: u8,
     as_int: bool,
+    /// When it was sent last.
+    sent: Option<Stamp>,
+    /// Final acknowledgements that came.
+    acks: u8,
+    /// The autopilot said that it is at work on it.
+    at_work: bool,
     percent: Option<u8>,
-    /// The next acknowledgement may be of what this overtook.
-    skips_ack: bool,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -130,7 +149,7 @@ enum Phase {
     /// Refused; waits for the words.
     Refused {
         until: Stamp,
-        result: &'static str,
+        result: Refusal,
     },
     Accepted,
     /// By a termination.
@@ -141,6 +160,7 @@ enum Phase {
 #[derive(Debug, Clone, Default)]
 pub struct Commands {
     open: VecDeque<Transaction>,
+    owed: Owed,
 }
 
 impl Commands {
@@ -150,7 +170,9 @@ impl Commands {
     /// [`CommandError::Busy`] when too many are under way.
     pub fn submit(&mut self, ticket: Ticket, command: Command) -> Result<(), CommandError> {
         let terminates = command == Command::Disarm { force: true };
-        let skips_ack = terminates && self.overtake(command);
+        if terminates {
+            self.overtake(command);
+        }
         // A termination waits for no place.
         if self.open.len() >= OPEN_MAX && !(terminates && self.open.len() < 2 * OPEN_MAX) {
             return Err(CommandError::Busy);
@@ -162,53 +184,59 @@ impl Commands {
             started: None,
             tries: 0,
             as_int: false,
+            sent: None,
+            acks: 0,
+            at_work: false,
             percent: None,
-            skips_ack,
         });
         Ok(())
     }
 
-    /// Ends whatever else is under way under the same id. Returns whether its acknowledgement may still come.
-    fn overtake(&mut self, command: Command) -> bool {
-        let mut answer_due = false;
+    /// Ends whatever else is under way under the same id.
+    fn overtake(&mut self, command: Command) {
         let others = self.open.iter_mut().filter(|open| open.command.id() == command.id() && open.command != command);
-        for open in others {
-            answer_due |= matches!(open.phase, Phase::Sent { .. } | Phase::InProgress { .. });
-            open.phase = Phase::Overtaken;
-        }
-        answer_due
+        others.for_each(|open| open.phase = Phase::Overtaken);
     }
 
     /// Takes an acknowledgement from the autopilot. `own_system` and `own_component` are ours: one addressed to another client
     /// is not for us.
     pub fn observe_ack(&mut self, ack: &ardu::COMMAND_ACK_DATA, own_system: u8, own_component: u8, now: Stamp) {
+        self.take(ack, Some(ack.result), Refusal::Listed(words(ack.result)), (own_system, own_component), now);
+    }
+
+    /// The same, where the result is a number of a newer MAVLink; see [`Unlisted`].
+    pub fn observe_unlisted(&mut self, answer: &Unlisted, own_system: u8, own_component: u8, now: Stamp) {
+        if let Unlisted::Ack(ack, number) = answer {
+            self.take(ack, None, Refusal::Unlisted(*number), (own_system, own_component), now);
+        }
+    }
+
+    /// An acknowledgement by its result, `None` if that is not known; `refusal` is what it says if it says no.
+    fn take(
+        &mut self,
+        ack: &ardu::COMMAND_ACK_DATA,
+        result: Option<MavResult>,
+        refusal: Refusal,
+        (own_system, own_component): (u8, u8),
+        now: Stamp,
+    ) {
         // Old firmware leaves the address empty.
         let for_us = (ack.target_system == 0 && ack.target_component == 0)
             || (ack.target_system == own_system && (ack.target_component == own_component || ack.target_component == 0));
         if !for_us {
             return;
         }
-        let waiting = |open: &&mut Transaction| {
-            open.command.id() == ack.command && matches!(open.phase, Phase::Sent { .. } | Phase::InProgress { .. })
-        };
-        let Some(open) = self.open.iter_mut().find(waiting) else { return };
-        // Skipped wrongly, it is answered again when it is sent again.
-        if std::mem::take(&mut open.skips_ack) && open.tries <= 1 {
+        let ends = result != Some(MavResult::MAV_RESULT_IN_PROGRESS);
+        let begun = |open: &&mut Transaction| open.command.id() == ack.command && !matches!(open.phase, Phase::Waiting);
+        let open = self.open.iter_mut().find(begun);
+        // Taken for a late one wrongly, it is answered again when it is sent again.
+        let may_be_late = open.as_ref().is_none_or(|open| open.tries <= 1 && open.acks == 0 && !open.at_work);
+        if may_be_late && self.owed.settle(ack.command, ends, now) {
             return;
         }
-        open.phase = match ack.result {
-            MavResult::MAV_RESULT_ACCEPTED => Phase::Accepted,
-            MavResult::MAV_RESULT_IN_PROGRESS => {
-                // 255: not known.
-                open.percent = Some(ack.progress).filter(|percent| *percent <= 100).or(open.percent);
-                Phase::InProgress { until: now.plus_secs_f64(PROGRESS_S) }
-            }
-            MavResult::MAV_RESULT_COMMAND_INT_ONLY if !open.as_int => {
-                open.as_int = true;
-                Phase::Sent { until: now }
-            }
-            refused => Phase::Refused { until: now.plus_secs_f64(WORDS_S), result: words(refused) },
-        };
+        let Some(open) = open else { return };
+        open.acks = open.acks.saturating_add(u8::from(ends));
+        open.answered(ack, result, refusal, now);
     }
 
     /// Sends what is due, ends what has ended.
@@ -224,6 +252,7 @@ impl Commands {
             let keep = open.step(to, texts, now, &mut effects);
             if !keep {
                 busy.pop();
+                self.owed.remember(open.owes(), now);
             }
             keep
         });
@@ -233,7 +262,7 @@ impl Commands {
     /// Stops sending whatever would change mode or motors: the vehicle went into `mode`, which guidance didn't ask for. If a
     /// person asked for it here, that was done, whether or not the acknowledgement has come. What the autopilot `to` is at work on
     /// is cancelled there, too.
-    pub fn withdraw(&mut self, to: Option<Address>, mode: Option<FlightMode>) -> Vec<Effect> {
+    pub fn withdraw(&mut self, to: Option<Address>, mode: Option<FlightMode>, now: Stamp) -> Vec<Effect> {
         let mut ended = Vec::new();
         self.open.retain(|open| {
             // A person's termination stands: whoever has the vehicle, its motors are to stop.
@@ -244,6 +273,7 @@ impl Commands {
                 let reached = mode.is_some_and(|mode| open.command == Command::SetMode(mode));
                 let outcome = if reached { Ok(()) } else { open.cut_short(CommandError::Withdrawn) };
                 ended.push(Effect::Done(open.ticket, open.command, outcome));
+                self.owed.remember(open.owes(), now);
             }
             keep
         });
@@ -252,15 +282,50 @@ impl Commands {
 
     /// The link is down: what was not acknowledged has no outcome.
     pub fn abandon(&mut self) -> Vec<Effect> {
+        self.owed = Owed::default();
         let end = |open: Transaction| Effect::Done(open.ticket, open.command, open.cut_short(CommandError::LinkLost));
         self.open.drain(..).map(end).collect()
     }
 }
 
 impl Transaction {
+    /// Its acknowledgement came.
+    fn answered(&mut self, ack: &ardu::COMMAND_ACK_DATA, result: Option<MavResult>, refusal: Refusal, now: Stamp) {
+        let sent_again = matches!(self.phase, Phase::Sent { .. });
+        if !sent_again && !matches!(self.phase, Phase::InProgress { .. }) {
+            return;
+        }
+        self.phase = match result {
+            Some(MavResult::MAV_RESULT_ACCEPTED) => Phase::Accepted,
+            Some(MavResult::MAV_RESULT_IN_PROGRESS) => {
+                // 255: not known.
+                self.percent = Some(ack.progress).filter(|percent| *percent <= 100).or(self.percent);
+                self.at_work = true;
+                Phase::InProgress { until: now.plus_secs_f64(PROGRESS_S) }
+            }
+            // Asked again for what it is at work on, it may say that it is busy: with this. That refuses the second, not the first.
+            Some(MavResult::MAV_RESULT_TEMPORARILY_REJECTED) if self.at_work && sent_again => {
+                Phase::InProgress { until: now.plus_secs_f64(PROGRESS_S) }
+            }
+            Some(MavResult::MAV_RESULT_COMMAND_INT_ONLY) if !self.as_int => {
+                self.as_int = true;
+                Phase::Sent { until: now }
+            }
+            Some(_) | None => Phase::Refused { until: now.plus_secs_f64(WORDS_S), result: refusal },
+        };
+    }
+
+    /// Under which id how many acknowledgements may still come, and when it was sent last. An acknowledgement of one stream is as
+    /// good as another's, and their line is long.
+    fn owes(&self) -> Option<(MavCmd, u8, Stamp)> {
+        let count = self.tries.saturating_sub(self.acks);
+        let counts = count > 0 && !matches!(self.command, Command::SetInterval(_));
+        self.sent.filter(|_| counts).map(|sent| (self.command.id(), count, sent))
+    }
+
     /// What stops the autopilot, if it said that it is at work on this.
     fn cancellation(&self, to: Address) -> Option<MavMessage> {
-        matches!(self.phase, Phase::InProgress { .. }).then(|| {
+        self.at_work.then(|| {
             MavMessage::COMMAND_CANCEL(ardu::COMMAND_CANCEL_DATA {
                 command: self.command.id(),
                 target_system: to.system(),
@@ -303,11 +368,16 @@ impl Transaction {
             Phase::Waiting | Phase::Sent { .. } | Phase::InProgress { .. } => {
                 effects.push(Effect::Send(self.command.message(to, self.tries, self.as_int)));
                 self.tries += 1;
+                self.sent = Some(now);
                 self.started.get_or_insert(now);
                 self.phase = Phase::Sent { until: now.plus_secs_f64(RETRY_S) };
                 return true;
             }
         };
+        if matches!(outcome, Err(CommandError::TimedOut { .. })) {
+            // Given up here, it is not to go on there.
+            effects.extend(self.cancellation(to).map(Effect::Send));
+        }
         effects.push(Effect::Done(self.ticket, self.command, outcome));
         false
     }
@@ -500,13 +570,13 @@ mod tests {
         let effects = commands.poll(to(), &Texts::default(), t(1.2));
         assert_eq!(stop(&effects), 1);
         // Not even the pilot's mode change withdraws it, if a person asked.
-        assert!(commands.withdraw(None, None).is_empty());
+        assert!(commands.withdraw(None, None, t(1.5)).is_empty());
         commands.observe_ack(&accepted, OWN.0, OWN.1, t(1.3));
         let effects = commands.poll(to(), &Texts::default(), t(1.3));
         assert!(matches!(effects[..], [Effect::Done(99, Command::Disarm { force: true }, Ok(()))]), "{effects:?}");
         // Our own is.
         commands.submit(0, Command::Disarm { force: true }).unwrap();
-        assert_eq!(commands.withdraw(None, None).len(), 1);
+        assert_eq!(commands.withdraw(None, None, t(1.5)).len(), 1);
     }
 
     #[test]
@@ -567,7 +637,7 @@ mod tests {
                 let ack = ack(MavCmd::MAV_CMD_DO_SET_MODE, MavResult::MAV_RESULT_ACCEPTED, OWN);
                 commands.observe_ack(&ack, OWN.0, OWN.1, t(0.1));
             }
-            let [Effect::Done(5, _, outcome)] = &commands.withdraw(None, Some(mode))[..] else { panic!("no outcome") };
+            let [Effect::Done(5, _, outcome)] = &commands.withdraw(None, Some(mode), t(0.2))[..] else { panic!("no outcome") };
             outcome.clone()
         };
         assert_eq!(asked(true, FlightMode::Loiter), Ok(()));
@@ -589,11 +659,11 @@ mod tests {
             commands
         };
         let mut commands = begun();
-        assert!(matches!(commands.withdraw(Some(to()), None)[..], [Effect::Done(1, _, Err(CommandError::Withdrawn))]));
+        assert!(matches!(commands.withdraw(Some(to()), None, t(0.3))[..], [Effect::Done(1, _, Err(CommandError::Withdrawn))]));
         let mut commands = begun();
         commands.observe_ack(&progress(40), OWN.0, OWN.1, t(0.1));
         commands.observe_ack(&progress(255), OWN.0, OWN.1, t(0.2));
-        let effects = commands.withdraw(Some(to()), None);
+        let effects = commands.withdraw(Some(to()), None, t(0.3));
         let [Effect::Send(MavMessage::COMMAND_CANCEL(data)), Effect::Done(1, _, Err(CommandError::Withdrawn))] = &effects[..]
         else {
             panic!("{effects:?}")
@@ -605,6 +675,106 @@ mod tests {
         let outcome = outcomes.filter_map(|effect| if let Effect::Done(_, _, outcome) = effect { Some(outcome) } else { None });
         let errors: Vec<_> = outcome.filter_map(Result::err).map(|error| error.to_string()).collect();
         assert_eq!(errors, ["the autopilot did not answer 4 tries, 40 % done"]);
+    }
+
+    /// MAVLink has results 0 to 10 here; ArduPilot and PX4 may get more.
+    #[test]
+    fn a_result_that_is_not_known_is_a_refusal_that_names_its_number() {
+        let mut commands = Commands::default();
+        commands.submit(1, Command::Arm).unwrap();
+        commands.poll(to(), &Texts::default(), t(0.0));
+        let arm = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM;
+        let answer = |target| Unlisted::Ack(ack(arm, MavResult::MAV_RESULT_TEMPORARILY_REJECTED, target), 77);
+        commands.observe_unlisted(&answer((255, 190)), OWN.0, OWN.1, t(0.1));
+        assert!(commands.poll(to(), &Texts::default(), t(0.5)).is_empty(), "another client's");
+        commands.observe_unlisted(&answer(OWN), OWN.0, OWN.1, t(0.5));
+        let effects = commands.poll(to(), &Texts::default(), t(0.9));
+        let [Effect::Done(1, _, Err(error))] = &effects[..] else { panic!("{effects:?}") };
+        assert_eq!(*error, CommandError::Refused { result: Refusal::Unlisted(77), words: None });
+        assert_eq!(error.to_string(), "the autopilot refused: result 77, which is not known here");
+    }
+
+    /// GUIDED is sent twice, since its acknowledgement is slow; LAND after it was refused, and its refusal must not be missed for the
+    /// second acknowledgement of GUIDED.
+    #[test]
+    fn a_late_second_acknowledgement_is_not_taken_for_the_next_commands() {
+        let mut commands = Commands::default();
+        let id = MavCmd::MAV_CMD_DO_SET_MODE;
+        let sent = |effects: &[Effect]| effects.iter().filter(|effect| matches!(effect, Effect::Send(_))).count();
+        commands.submit(1, Command::SetMode(FlightMode::Guided)).unwrap();
+        commands.poll(to(), &Texts::default(), t(0.0));
+        assert_eq!(sent(&commands.poll(to(), &Texts::default(), t(1.0))), 1);
+        commands.observe_ack(&ack(id, MavResult::MAV_RESULT_ACCEPTED, OWN), OWN.0, OWN.1, t(1.1));
+        commands.submit(2, Command::SetMode(FlightMode::Land)).unwrap();
+        let effects = commands.poll(to(), &Texts::default(), t(1.1));
+        assert!(matches!(effects[..], [Effect::Done(1, _, Ok(())), Effect::Send(_)]), "{effects:?}");
+        commands.observe_ack(&ack(id, MavResult::MAV_RESULT_ACCEPTED, OWN), OWN.0, OWN.1, t(1.9));
+        assert!(commands.poll(to(), &Texts::default(), t(1.9)).is_empty(), "that was for GUIDED");
+        commands.observe_ack(&ack(id, MavResult::MAV_RESULT_FAILED, OWN), OWN.0, OWN.1, t(2.0));
+        let effects = commands.poll(to(), &Texts::default(), t(2.4));
+        assert!(matches!(effects[..], [Effect::Done(2, _, Err(CommandError::Refused { .. }))]), "{effects:?}");
+        // Lost, rather than late, it costs one more try, and no more than that.
+        commands.submit(3, Command::SetMode(FlightMode::Guided)).unwrap();
+        commands.poll(to(), &Texts::default(), t(10.0));
+        commands.poll(to(), &Texts::default(), t(11.0));
+        commands.observe_ack(&ack(id, MavResult::MAV_RESULT_ACCEPTED, OWN), OWN.0, OWN.1, t(11.1));
+        commands.submit(4, Command::SetMode(FlightMode::Land)).unwrap();
+        let mut answered_s = None;
+        for tenth in 111..150 {
+            let now = t(f64::from(tenth) * 0.1);
+            for effect in commands.poll(to(), &Texts::default(), now) {
+                match effect {
+                    Effect::Send(_) => {
+                        commands.observe_ack(&ack(id, MavResult::MAV_RESULT_ACCEPTED, OWN), OWN.0, OWN.1, now);
+                    }
+                    Effect::Done(4, _, Ok(())) => answered_s = Some(f64::from(tenth) * 0.1),
+                    _ => {}
+                }
+            }
+        }
+        assert!(answered_s.is_some_and(|s| s < 12.5), "{answered_s:?}");
+        // Nor is it waited for once it is too late to come.
+        commands.submit(5, Command::SetMode(FlightMode::Loiter)).unwrap();
+        commands.poll(to(), &Texts::default(), t(30.0));
+        commands.observe_ack(&ack(id, MavResult::MAV_RESULT_ACCEPTED, OWN), OWN.0, OWN.1, t(30.1));
+        assert!(matches!(commands.poll(to(), &Texts::default(), t(30.1))[..], [Effect::Done(5, _, Ok(()))]));
+    }
+
+    /// MAVLink: whatever else comes while a long command runs is typically rejected with TEMPORARILY_REJECTED, a repetition included.
+    #[test]
+    fn busy_with_what_it_was_asked_twice_is_no_refusal_and_given_up_it_is_cancelled() {
+        let id = MavCmd::MAV_CMD_NAV_TAKEOFF;
+        let answer = |commands: &mut Commands, result, now| {
+            commands.observe_ack(&ack(id, result, OWN), OWN.0, OWN.1, now);
+        };
+        let begun = || {
+            let mut commands = Commands::default();
+            commands.submit(1, Command::TakeOff { height_above_home_m: 5.0 }).unwrap();
+            commands.poll(to(), &Texts::default(), t(0.0));
+            answer(&mut commands, MavResult::MAV_RESULT_IN_PROGRESS, t(0.1));
+            commands
+        };
+        let mut commands = begun();
+        let effects = commands.poll(to(), &Texts::default(), t(5.2));
+        assert!(matches!(effects[..], [Effect::Send(MavMessage::COMMAND_LONG(_))]), "{effects:?}");
+        answer(&mut commands, MavResult::MAV_RESULT_TEMPORARILY_REJECTED, t(5.3));
+        assert!(commands.poll(to(), &Texts::default(), t(9.0)).is_empty(), "it is at work");
+        answer(&mut commands, MavResult::MAV_RESULT_ACCEPTED, t(9.1));
+        assert!(matches!(commands.poll(to(), &Texts::default(), t(9.1))[..], [Effect::Done(1, _, Ok(()))]));
+        // Not asked twice, it is one.
+        let mut commands = begun();
+        answer(&mut commands, MavResult::MAV_RESULT_TEMPORARILY_REJECTED, t(0.2));
+        assert!(matches!(commands.poll(to(), &Texts::default(), t(1.0))[..], [Effect::Done(1, _, Err(_))]));
+        // Silent from then on.
+        let mut commands = begun();
+        let effects: Vec<Effect> =
+            (1..300).flat_map(|step| commands.poll(to(), &Texts::default(), t(f64::from(step) * 0.1))).collect();
+        let [.., Effect::Send(MavMessage::COMMAND_CANCEL(data)), Effect::Done(1, _, Err(CommandError::TimedOut { .. }))] =
+            &effects[..]
+        else {
+            panic!("{effects:?}")
+        };
+        assert_eq!(data.command, id);
     }
 
     #[test]

@@ -18,6 +18,7 @@
 //! | leader silent | predicted for 1 s, held for until 5 s, then returns | it is heard | `a_silent_leader_is_predicted_then_waited_for_then_given_up` |
 //! | leader in another mode, or not flying | holds, then returns | it may be followed again | `a_leader_that_leaves_the_allowed_modes_ends_the_following` |
 //! | leader's position jumps | holds; both places are kept clear | it has settled | `a_leader_that_jumps_is_not_followed_and_both_places_are_kept_clear` |
+//! | autopilot does not follow its targets (outside its own fence, or for another reason) | holds, with its last words; tries again after 15 s, 30 s, 60 s …; not on the way home, where it is said | it follows, or a new task | `targets_that_the_autopilot_ignores_are_held_for_and_tried_again` |
 //! | clearance lapsed or withdrawn in a descent | stops, climbs to the approach height, waits, then returns | a new clearance | `a_withdrawn_clearance_stops_the_descent_climbs_waits_and_returns` |
 //! | our clock set back, or stood still | everything dated goes back with it: nothing lasts longer | | `a_clock_that_goes_back_lengthens_nothing` |
 //! | our clock set forward | plans and clearances lapse; nothing else is rushed | a newer plan | `a_clock_that_goes_forward_lapses_permissions_and_rushes_nothing` |
@@ -32,6 +33,7 @@
 use halcyon_model::{Stamp, VehicleState};
 
 use super::energy::Consumption;
+use super::heed::NotFollowed;
 use super::interlock::FollowRefusal;
 use super::limits::FailSafeLimits;
 
@@ -49,6 +51,7 @@ pub enum Cause {
     BatteryReturn,
     StalePlan,
     Leader,
+    Unheeded,
     Clearance,
 }
 
@@ -98,6 +101,8 @@ pub struct Conditions<'a> {
     pub jumped_m: Option<f64>,
     /// How long the way home would take in still air, landing included, seconds; `None` if home is unknown.
     pub home_s: Option<f64>,
+    /// The autopilot does not follow its targets.
+    pub unheeded: Option<&'a NotFollowed>,
 }
 
 /// For how long something has been so, seconds, as far as it was watched: a clock that leaps makes nothing last longer.
@@ -225,6 +230,6 @@ impl FailSafes {
             };
             return alarm(Cause::Leader, action, refused.to_string());
         }
-        None
+        conditions.unheeded.and_then(|refusal| alarm(Cause::Unheeded, Action::Hold, refusal.to_string()))
     }
 }

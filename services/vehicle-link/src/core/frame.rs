@@ -69,9 +69,13 @@ impl Frame {
     /// What it says; `None` if the dialect doesn't have the message, or a value in it.
     #[must_use]
     pub fn message(&self) -> Option<MavMessage> {
+        MavMessage::parse(self.version(), self.message_id(), self.payload()?).ok()
+    }
+
+    /// The payload, as it came; `None` if the dialect doesn't have the message, so that nothing vouches for it.
+    pub(super) fn payload(&self) -> Option<&[u8]> {
         let start = if self.version() == MavlinkVersion::V1 { 6 } else { 10 };
-        let payload = self.bytes.get(start..start + usize::from(self.at(1)))?;
-        self.is_known.then(|| MavMessage::parse(self.version(), self.message_id(), payload).ok()).flatten()
+        self.bytes.get(start..start + usize::from(self.at(1))).filter(|_| self.is_known)
     }
 
     /// A message of ours as a frame; `None` for one that MAVLink 1 can't number.

@@ -12,7 +12,7 @@ use super::observer::LEAN_S;
 use super::track::Motion;
 
 /// Shaping on ArduCopter: velocity error to acceleration, 1/s; greatest acceleration, metres per second squared; greatest jerk,
-/// metres per second cubed (PSC_JERK_XY's order).
+/// metres per second cubed (PSC_JERK_XY's order; PSC_JERK_NE since 4.7).
 const SHAPE_HZ: f64 = 3.0;
 const ACCELERATION_MPS2_MAX: f64 = 2.5;
 const JERK_MPS3_MAX: f64 = 8.0;

@@ -18,9 +18,9 @@ use super::track::Motion;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Loops {
-    /// Position error to velocity, 1/s: ArduCopter's PSC_POSXY_P.
+    /// Position error to velocity, 1/s: ArduCopter's PSC_POSXY_P, PSC_NE_POS_P since 4.7.
     pub position_gain_hz: f64,
-    /// Velocity error to acceleration, 1/s: ArduCopter's PSC_VELXY_P.
+    /// Velocity error to acceleration, 1/s: ArduCopter's PSC_VELXY_P, PSC_NE_VEL_P since 4.7.
     pub velocity_gain_hz: f64,
     /// From a demanded acceleration to the real one, seconds: 1 / ATC_ANG_RLL_P, and the rate loop's and the motors' own lag.
     pub lean_lag_s: f64,

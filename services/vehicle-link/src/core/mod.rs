@@ -11,6 +11,7 @@ pub mod executor;
 pub mod failsafe;
 pub mod frame;
 pub mod guidance;
+pub mod heed;
 pub mod identity;
 pub mod intent;
 pub mod interlock;
@@ -24,9 +25,11 @@ pub mod loss;
 pub mod mode;
 pub mod motion;
 pub mod observer;
+mod owed;
 pub mod parameters;
 pub mod payload;
 pub mod px4;
+pub mod renames;
 pub mod separation;
 pub mod signing;
 pub mod station;
@@ -37,6 +40,7 @@ pub mod text;
 pub mod timesync;
 pub mod track;
 pub mod transfers;
+pub mod unlisted;
 pub mod version;
 
 #[cfg(test)]

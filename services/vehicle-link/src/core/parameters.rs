@@ -10,7 +10,7 @@ use mavlink::dialects::ardupilotmega as ardu;
 use mavlink::dialects::ardupilotmega::{MavMessage, MavParamError, MavParamType};
 
 use super::encode::Address;
-use super::transfers::{Ending, Retry, TransferError, Transferred};
+use super::transfers::{Ending, ParameterRefusal, Retry, TransferError, Transferred};
 
 /// An answer is awaited for so long, seconds.
 const RETRY_S: f64 = 0.8;
@@ -112,7 +112,7 @@ fn refusal(name: &ParameterName, error: MavParamError) -> TransferError {
     if error == MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST {
         TransferError::NoSuchParameter(name.clone())
     } else {
-        TransferError::ParameterRefused { name: name.clone(), why: words(error) }
+        TransferError::ParameterRefused { name: name.clone(), why: ParameterRefusal::Listed(words(error)) }
     }
 }
 
@@ -146,6 +146,13 @@ impl ReadOne {
                 self.found = Some(Err(refusal(&self.name, data.error)));
             }
             _ => {}
+        }
+    }
+
+    /// Refused for a reason that isn't known.
+    pub(super) fn refused(&mut self, name: &str, why: ParameterRefusal) {
+        if name == self.name.as_str() {
+            self.found = Some(Err(TransferError::ParameterRefused { name: self.name.clone(), why }));
         }
     }
 
@@ -353,6 +360,17 @@ impl SetOne {
                 write.ended = Some(Err(refusal(name, data.error)));
             }
             _ => {}
+        }
+    }
+
+    /// Refused for a reason that isn't known.
+    pub(super) fn refused(&mut self, name: &str, why: ParameterRefusal) {
+        match self.write.as_mut() {
+            None => self.read.refused(name, why),
+            Some(write) if name == self.read.name.as_str() => {
+                write.ended = Some(Err(TransferError::ParameterRefused { name: self.read.name.clone(), why }));
+            }
+            Some(_) => {}
         }
     }
 

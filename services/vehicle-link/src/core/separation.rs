@@ -26,7 +26,7 @@ const REACTION_S: f64 = 0.6;
 const OPENING_HZ: f64 = 1.0;
 /// Speed at which it is restored at most, relative to the obstacle, metres per second.
 const OPENING_MPS_MAX: f64 = 2.0;
-/// How an autopilot goes after a reference that is ahead of it, 1/s: ArduCopter's PSC_POSXY_P.
+/// How an autopilot goes after a reference that is ahead of it, 1/s: ArduCopter's PSC_POSXY_P, PSC_NE_POS_P since 4.7.
 const CHASE_HZ: f64 = 1.0;
 /// A silent vehicle may have gone anywhere: its kept distance grows by this much a second, up to [`GROWTH_M_MAX`].
 const GROWTH_MPS: f64 = 0.5;

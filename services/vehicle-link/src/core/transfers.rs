@@ -18,6 +18,8 @@ use super::commands::{Effect, Ticket};
 use super::encode::Address;
 use super::items::{Clear, Download, Upload};
 use super::parameters::{Encoding, ReadAll, ReadOne, SetOne};
+use super::renames;
+use super::unlisted::Unlisted;
 
 /// Transfers that wait; more are refused.
 const WAITING_MAX: usize = 16;
@@ -56,19 +58,30 @@ impl Request {
     }
 }
 
+/// Why the autopilot refused a parameter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum ParameterRefusal {
+    /// MAVLink's error, in words.
+    #[error("{0}")]
+    Listed(&'static str),
+    /// A number that MAVLink's errors do not have here.
+    #[error("error {0}, which is not known here")]
+    Unlisted(u8),
+}
+
 /// How a transfer failed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TransferError {
     /// It answers for others, not for this one.
-    #[error("the autopilot knows no parameter {0}")]
+    #[error("the autopilot knows no parameter {name}{hint}", name = .0, hint = renames::hint(.0))]
     NoSuchParameter(ParameterName),
     /// It said why not.
     #[error("the autopilot refused {name}: {why}")]
     ParameterRefused {
         /// Which.
         name: ParameterName,
-        /// Its error, in words.
-        why: &'static str,
+        /// Its error.
+        why: ParameterRefusal,
     },
     /// The parameter cannot hold the value; nothing was sent.
     #[error("{0}")]
@@ -224,6 +237,14 @@ impl Job {
         }
     }
 
+    fn refused(&mut self, name: &str, why: ParameterRefusal) {
+        match self {
+            Self::Read(job) => job.refused(name, why),
+            Self::Set(job) => job.refused(name, why),
+            Self::ReadAll(_) | Self::Download(_) | Self::Upload(_) | Self::Clear(_) => {}
+        }
+    }
+
     fn poll(&mut self, to: Address, now: Stamp, out: &mut Vec<MavMessage>) -> Option<Ending> {
         match self {
             Self::Read(job) => job.poll(to, now, out),
@@ -310,6 +331,16 @@ impl Transfers {
         };
         if ours {
             active.job.observe(message, now);
+        }
+        ours
+    }
+
+    /// The same for an answer with a value that isn't known.
+    pub fn observe_unlisted(&mut self, answer: &Unlisted, own: (u8, u8)) -> bool {
+        let (Some(active), Unlisted::ParamError(data, number)) = (self.active.as_mut(), answer) else { return false };
+        let ours = is_for(own, data.target_system, data.target_component);
+        if let (true, Ok(name)) = (ours, data.param_id.to_str()) {
+            active.job.refused(name, ParameterRefusal::Unlisted(*number));
         }
         ours
     }

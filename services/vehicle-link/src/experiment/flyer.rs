@@ -237,7 +237,7 @@ impl Follower {
                         self.executor.observe_outcome(&command, &Err(error), now);
                     }
                 }
-                Output::Withdraw => drop(self.craft.link.withdraw()),
+                Output::Withdraw => drop(self.craft.link.withdraw(now)),
                 Output::AskStreams => self.craft.link.started_again(),
                 Output::Note(_) => {}
             }

@@ -23,6 +23,7 @@ use crate::core::budget::Budget;
 use crate::core::frame::Frame;
 use crate::core::signing::{Signer, Verdict};
 use crate::core::station;
+use crate::core::unlisted::Unlisted;
 use crate::core::version::Version;
 use crate::endpoint::Endpoint;
 
@@ -53,8 +54,8 @@ pub enum LinkEvent {
     Up,
     /// A message with its sender.
     Message(MavHeader, Box<MavMessage>),
-    /// A frame that was whole, of a message or a value that we don't know.
-    Unread(MavHeader),
+    /// A frame that was whole, of a message or a value that we don't know; and what it answers, as far as that can be told.
+    Unread(MavHeader, Option<Box<Unlisted>>),
     /// A frame whose signature is not ours; told at most once a second.
     Rejected(Verdict),
     /// A ground station sends this system something that flies it: [`crate::core::station::flies`].
@@ -292,7 +293,7 @@ impl Keeper {
             // Unknown messages and values of newer dialects: the frame was whole, the stream goes on.
             None => {
                 metrics::counter!("vehicle_link_messages_unread_total").increment(1);
-                LinkEvent::Unread(header)
+                LinkEvent::Unread(header, Unlisted::of(frame).map(Box::new))
             }
         };
         self.relay.to_stations(frame);

@@ -104,7 +104,7 @@ impl Onboard {
                     }
                 }
                 Output::Withdraw => {
-                    let ended = self.autopilot.withdraw();
+                    let ended = self.autopilot.withdraw(now);
                     self.carry_out(ended, now, &mut sent);
                 }
                 Output::AskStreams => self.autopilot.started_again(),

@@ -9,6 +9,7 @@ use halcyon_model::{Content, Item, ItemFrame, ItemKind, Parameter, ParameterKind
 use halcyon_vehicle_link::core::commands::Effect;
 use halcyon_vehicle_link::core::encode::Address;
 use halcyon_vehicle_link::core::transfers::{Ending, Request, TransferError, Transfers};
+use halcyon_vehicle_link::core::unlisted::Unlisted;
 use mavlink::dialects::ardupilotmega as ardu;
 use mavlink::dialects::ardupilotmega::{MavAutopilot, MavCmd, MavFrame, MavMessage, MavMissionType, MavParamType};
 use proptest::prelude::*;
@@ -337,14 +338,62 @@ fn px4s_integers_go_by_their_bytes() {
     assert_eq!(bench.script.parameters[1].1.to_bits(), 77);
 }
 
+/// MAVLink may get errors that the dialect has not; one for another client is not ours.
+#[test]
+fn an_error_that_is_not_known_ends_it_with_its_number() {
+    for request in [Request::Read(name("P_1")), Request::Set(name("P_1"), 1.0)] {
+        let mut transfers = Transfers::default();
+        transfers.submit(1, request, t(60.0)).unwrap();
+        transfers.poll(to(), t(0.0));
+        let error = |param: &str, target_component| {
+            let data = ardu::PARAM_ERROR_DATA {
+                param_index: -1,
+                target_system: 7,
+                target_component,
+                param_id: param.into(),
+                ..Default::default()
+            };
+            Unlisted::ParamError(data, 42)
+        };
+        assert!(!transfers.observe_unlisted(&error("P_1", 190), (7, 191)));
+        transfers.observe_unlisted(&error("P_2", 191), (7, 191));
+        assert!(transfers.poll(to(), t(0.1)).is_empty());
+        assert!(transfers.observe_unlisted(&error("P_1", 191), (7, 191)));
+        let effects = transfers.poll(to(), t(0.2));
+        let [Effect::Transferred(1, Err(error))] = &effects[..] else { panic!("{effects:?}") };
+        assert_eq!(error.to_string(), "the autopilot refused P_1: error 42, which is not known here");
+    }
+}
+
 #[test]
 fn an_unknown_name_is_told_from_silence() {
     for says_errors in [true, false] {
         let mut script = with_parameters(ARDU, 5);
         script.says_errors = says_errors;
-        let (ending, _) = Bench::new(script, 0.0, 1).run(Request::Read(name("NONE")), 60.0);
+        let mut bench = Bench::new(script, 0.0, 1);
+        let (ending, took_s) = bench.run(Request::Read(name("NONE")), 60.0);
         assert_eq!(ending.unwrap_err().to_string(), "the autopilot knows no parameter NONE");
+        // ArduPilot 4.7 says so; before that it says nothing, and another one's answer must tell.
+        assert_eq!(took_s < 0.5, says_errors, "{took_s}");
+        let (ending, took_s) = bench.run(Request::Set(name("RTL_ALT"), 1500.0), 60.0);
+        let said = ending.unwrap_err().to_string();
+        assert_eq!(said, "the autopilot knows no parameter RTL_ALT; since ArduPilot 4.7 it is RTL_ALT_M = RTL_ALT / 100");
+        assert_eq!(took_s < 0.5, says_errors, "{took_s}");
     }
+}
+
+/// ArduPilot 4.7 tells an error of a value by PARAM_ERROR, with the value that stays after it or without; one that another client
+/// got for the same parameter is not ours.
+#[test]
+fn a_value_that_is_refused_ends_the_writing_at_once_and_only_ours_does() {
+    let mut bench = Bench::new(with_parameters(ARDU, 3), 0.0, 1);
+    bench.script.denies = Some(1);
+    let (ending, took_s) = bench.run(Request::Set(name("P_1"), 7.0), 60.0);
+    assert_eq!(ending.unwrap_err().to_string(), "the autopilot refused P_1: permission denied");
+    assert!(took_s < 0.5, "{took_s}");
+    bench.script.denies = None;
+    bench.script.denies_another = true;
+    assert_eq!(bench.run(Request::Set(name("P_1"), 7.0), 60.0).0.unwrap().what, "P_1 is 7");
 }
 
 fn read_all(ending: Ending) -> Vec<(String, f64)> {

@@ -73,6 +73,10 @@ pub(crate) struct Script {
     pub(crate) says_errors: bool,
     /// A parameter that keeps its value.
     pub(crate) stuck: Option<usize>,
+    /// A parameter that may not be set, which it says.
+    pub(crate) denies: Option<usize>,
+    /// It denies the same to another client, at the same time.
+    pub(crate) denies_another: bool,
     /// Refuses items of this command.
     pub(crate) refuses: Option<u32>,
     /// How often it was told to stop.
@@ -103,6 +107,8 @@ impl Script {
             parameters: Vec::new(),
             says_errors: false,
             stuck: None,
+            denies: None,
+            denies_another: false,
             refuses: None,
             cancelled: 0,
             heard: Vec::new(),
@@ -110,6 +116,17 @@ impl Script {
             streaming: None,
             out: VecDeque::new(),
         }
+    }
+
+    /// As ArduPilot since 4.7 does, before it tells the value that stays.
+    fn deny(&mut self, data: &ardu::PARAM_SET_DATA, (target_system, target_component): (u8, u8)) {
+        self.out.push_back(MavMessage::PARAM_ERROR(ardu::PARAM_ERROR_DATA {
+            param_index: -1,
+            target_system,
+            target_component,
+            param_id: data.param_id,
+            error: MavParamError::MAV_PARAM_ERROR_PERMISSION_DENIED,
+        }));
     }
 
     fn is_ardupilot(&self) -> bool {
@@ -182,7 +199,12 @@ impl Script {
                 }
             }
             MavMessage::PARAM_SET(data) => {
-                if let Some(index) = self.find(data.param_id.to_str().unwrap()) {
+                if self.denies_another {
+                    self.deny(data, (255, 190));
+                }
+                if self.denies.is_some_and(|index| self.find(data.param_id.to_str().unwrap()) == Some(index)) {
+                    self.deny(data, OWN);
+                } else if let Some(index) = self.find(data.param_id.to_str().unwrap()) {
                     if self.stuck != Some(index) {
                         self.parameters[index].1 = data.param_value;
                     }

@@ -91,6 +91,9 @@ fn its_parameters_are_read_set_and_kept_in_range() {
     assert_eq!(craft.run(Request::Set(speed(), 9000.0)).unwrap_err().to_string(), "WPNAV_SPEED stays at 450");
     let none = ParameterName::new("NO_SUCH_ONE").unwrap();
     assert_eq!(craft.run(Request::Read(none.clone())), Err(TransferError::NoSuchParameter(none)));
+    // It is of before 4.7.
+    let newer = craft.run(Request::Read(ParameterName::new("MAV_SYSID").unwrap())).unwrap_err().to_string();
+    assert_eq!(newer, "the autopilot knows no parameter MAV_SYSID; before ArduPilot 4.7 it is SYSID_THISMAV");
 }
 
 #[test]

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 use anyhow::Context as _;
 use halcyon_chassis::ConfigError;
+use halcyon_vehicle_link::core::renames::other_name;
 use reqwest::Method;
 use serde_json::{Value, json};
 
@@ -155,7 +156,9 @@ async fn load(
         }
     }
     for name in &unknown {
-        output::note(&format!("{name}: the vehicle has no such parameter"));
+        let other = other_name(name).filter(|other| now.iter().any(|(have, _)| *have == other.name));
+        let hint = other.map(|other| format!("; {other}")).unwrap_or_default();
+        output::note(&format!("{name}: the vehicle has no such parameter{hint}"));
     }
     if json {
         let rows: Vec<_> = differ.iter().map(|(name, from, to)| json!({ "name": name, "from": from, "to": to })).collect();

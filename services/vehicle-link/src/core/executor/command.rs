@@ -105,6 +105,7 @@ impl Executor {
                 }
                 let goal = Goal::Go { point, height_m, heading_rad: None };
                 self.check(&goal)?;
+                self.heeds(&goal).map_err(|refusal| refusal.to_string())?;
                 self.take_over(goal, command);
                 Ok(Decision::Accepted("on the way".into()))
             }
@@ -112,6 +113,7 @@ impl Executor {
                 self.in_air()?;
                 let goal = Goal::Follow { leader: leader.clone(), slot };
                 self.check(&goal)?;
+                self.heeds(&goal).map_err(|refusal| refusal.to_string())?;
                 let track = self.neighbours.get(leader);
                 interlock::may_follow(leader, track, &self.config.limits, &self.config.fail_safe, now)
                     .map_err(|refusal| refusal.to_string())?;

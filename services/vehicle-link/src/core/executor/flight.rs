@@ -82,8 +82,11 @@ impl Executor {
             }
         }
         self.climb = None;
+        let tries = alarm.as_ref().is_some_and(|alarm| alarm.cause == Cause::Unheeded) && !self.heed.holds();
         let effective = match alarm.as_ref().map(|alarm| alarm.action) {
             None => goal,
+            // Tried again now and then, to see whether the autopilot follows.
+            Some(Action::Hold) if tries => goal,
             Some(Action::Hold) => Goal::Stay,
             Some(Action::Return) => Goal::Return,
             Some(Action::Land) => Goal::LandHere,
@@ -132,7 +135,8 @@ impl Executor {
         };
         let homeward = matches!(goal, Goal::Return | Goal::LandHere);
         let (jumped_m, home_s) = (self.jumped_m(own, now), self.time_home_s(own));
-        let conditions = Conditions { own, plan: self.plan_health(now), follow, homeward, jumped_m, home_s };
+        let (plan, unheeded) = (self.plan_health(now), self.unheeded.as_ref());
+        let conditions = Conditions { own, plan, follow, homeward, jumped_m, home_s, unheeded };
         let alarm = self.fail_safes.step(&conditions, &self.config.fail_safe, now);
         if let Goal::Land { clearance, .. } = goal {
             if super::descent::clearance_problem(clearance.as_ref(), now).is_none() {

@@ -24,6 +24,7 @@ mod descent;
 mod flight;
 mod goal;
 mod ground;
+mod heed;
 mod intake;
 mod payload;
 mod settle;
@@ -46,6 +47,7 @@ use super::continuity::Continuity;
 use super::control::{Change, Control};
 use super::failsafe::{FailSafes, PlanHealth};
 use super::guidance::{Guidance, Reference, Setpoint};
+use super::heed::{Heed, NotFollowed};
 use super::interlock::mode_name;
 use super::inverse::Inverse;
 use super::limits::{FailSafeLimits, Limits};
@@ -196,6 +198,11 @@ pub struct Executor {
     detail: String,
     /// The autopilot's last words about a fail-safe of its own.
     autopilot_words: Option<(Stamp, String)>,
+    /// Its last words about anything.
+    words: Option<(Stamp, String)>,
+    heed: Heed,
+    /// The autopilot does not follow its targets.
+    unheeded: Option<NotFollowed>,
     watch: Watch,
     landing: Landing,
     notes: Vec<Note>,
@@ -244,6 +251,9 @@ impl Executor {
             activity: Activity::Idle,
             detail: "waiting for the autopilot".into(),
             autopilot_words: None,
+            words: None,
+            heed: Heed::default(),
+            unheeded: None,
             watch: Watch::default(),
             landing: Landing::default(),
             notes: Vec::new(),
@@ -381,6 +391,7 @@ impl Executor {
         if text.to_ascii_lowercase().contains("failsafe") {
             self.autopilot_words = Some((now, text.to_owned()));
         }
+        self.words = Some((now, text.to_owned()));
     }
 
     /// How a request ended.
@@ -463,6 +474,7 @@ impl Executor {
         self.active.clone_from(&goal);
         if self.airborne {
             self.fly(&own.state, goal, dt_s, now, outputs);
+            self.watch_heed(&own.state, dt_s, now, outputs);
         } else {
             self.stand(&own.state, goal, now, outputs);
             self.release_on_touchdown(&own.state, now, outputs);
@@ -481,6 +493,7 @@ impl Executor {
         self.uncleared = None;
         self.landed_for_goal = false;
         self.held = None;
+        self.forget_heed();
         self.fail_safes.new_task();
         if matches!(goal, Some(Goal::Land { .. })) {
             self.touchdown = None;
@@ -519,6 +532,7 @@ impl Executor {
 
     /// Forgets what guidance was doing, so that it starts smoothly from where the vehicle then is.
     fn let_go(&mut self) {
+        self.forget_heed();
         self.reference = None;
         self.left_slot();
         self.inverse = Inverse::default();

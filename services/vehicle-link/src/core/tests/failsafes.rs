@@ -1,11 +1,11 @@
 //! The rows of the fail-safe table that concern plans, links, batteries, people and clearances; the others are in `mishaps`.
 
-use halcyon_model::{Activity, Assignment, DispatchPlan, FlightMode, Task};
+use halcyon_model::{Activity, Assignment, DispatchPlan, FlightMode, LocalPoint, Task, VehicleAction};
 use nalgebra::Vector3;
 
 use super::world::{World, follow, id, land, survey};
 use crate::core::commands::Command;
-use crate::core::executor::{Output, PlanAnswer};
+use crate::core::executor::{Decision, Output, PlanAnswer};
 
 fn reason(world: &World, index: usize) -> &str {
     match world.activity(index) {
@@ -154,6 +154,52 @@ fn outside_the_fence_it_returns_and_a_task_outside_is_refused() {
     assert!(reason(&world, 0).contains("outside the fence"), "{:?}", world.activity(0));
     world.until(250.0, keep, |world| down(world, 0));
     assert!(world.copters[0].position.norm() < 0.5);
+}
+
+/// ArduCopter's own fence ends where ours goes on.
+#[test]
+fn targets_that_the_autopilot_ignores_are_held_for_and_tried_again() {
+    let far = |world: &mut World| drop(world.plan(&[(0, survey(100.0, 0.0))], 5.0));
+    let mut world = holding();
+    world.copters[0].fence_m = 60.0;
+    world.until(30.0, far, |world| world.copters[0].position.x > 57.0);
+    let now = world.now;
+    world.executors[0].observe_text("Fence: 60m", now);
+    let took_s = world.until(15.0, far, |world| !reason(world, 0).is_empty());
+    assert!(took_s > 3.0, "{took_s}: it lags, it might have been thought");
+    assert_eq!(reason(&world, 0), "the autopilot does not follow its targets; its own fence? (it said: Fence: 60m)");
+    let alarms = |world: &World| world.notes.iter().filter(|(_, note)| note.what == "fail-safe").count();
+    // Through several tries it stays where it is, in GUIDED, and says so once.
+    let place = world.copters[0].position;
+    world.run(90.0, |world| {
+        far(world);
+        assert!((world.copters[0].position - place).norm() < 2.0, "{}", world.copters[0].position);
+        assert_eq!(world.copters[0].mode, FlightMode::Guided);
+        assert!(reason(world, 0).contains("does not follow"), "{:?}", world.activity(0));
+    });
+    assert_eq!(alarms(&world), 1, "{:?}", world.notes);
+    // The same again is refused, something else is not.
+    let go = |north_m| VehicleAction::GoTo { point: LocalPoint::new(north_m, 0.0), height_m: 5.0 };
+    let Decision::Refused(why) = world.command(0, go(100.0)) else { panic!("it was not refused") };
+    assert!(why.contains("does not follow its targets"), "{why}");
+    assert!(matches!(world.command(0, go(30.0)), Decision::Accepted(_)));
+    world.until(30.0, |_| {}, |world| matches!(world.activity(0), Activity::Holding { settled: true }));
+    assert!((world.copters[0].position.x - 30.0).abs() < 1.0);
+    // The autopilot's fence is taken away while it is held for: the next try goes on.
+    let mut world = holding();
+    world.copters[0].fence_m = 60.0;
+    world.until(60.0, far, |world| !reason(world, 0).is_empty());
+    world.copters[0].fence_m = f64::INFINITY;
+    world.until(60.0, far, |world| matches!(world.activity(0), Activity::Holding { settled: true }));
+    assert!((world.copters[0].position.x - 100.0).abs() < 1.0);
+    // On the way home there is nothing to hold for, but it is said.
+    let mut world = World::new(&[(0.0, 0.0)]);
+    world.airborne(0, Vector3::new(100.0, 0.0, -6.0));
+    world.run(2.0, far);
+    world.copters[0].fence_m = -1.0;
+    world.run(20.0, |world| drop(world.plan(&[(0, Task::Return)], 5.0)));
+    assert_eq!(*world.activity(0), Activity::Returning);
+    assert_eq!(world.notes.iter().filter(|(_, note)| note.what == "not on its way home").count(), 1, "{:?}", world.notes);
 }
 
 #[test]

@@ -4,6 +4,7 @@ mod commands;
 mod failsafes;
 mod flights;
 mod formation;
+mod heed;
 mod mishaps;
 mod payload;
 mod properties;

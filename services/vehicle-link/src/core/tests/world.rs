@@ -48,6 +48,8 @@ pub(super) struct Copter {
     pub(super) rangefinder: Option<f64>,
     /// Waves under it: amplitude, metres, and period, seconds.
     pub(super) waves: (f64, f64),
+    /// It drops targets further from the origin than this, as ArduCopter does outside its own fence, metres.
+    pub(super) fence_m: f64,
     /// It notices when it has landed.
     pub(super) finds_ground: bool,
     pub(super) home: Vector3<f64>,
@@ -64,7 +66,10 @@ impl Copter {
     }
 
     fn take(&mut self, command: Command) -> Result<(), crate::core::commands::CommandError> {
-        let no = |result| Err(crate::core::commands::CommandError::Refused { result, words: None });
+        let no = |result| {
+            let result = crate::core::commands::Refusal::Listed(result);
+            Err(crate::core::commands::CommandError::Refused { result, words: None })
+        };
         match command {
             Command::Arm if self.ready && self.mode == FlightMode::Guided => self.armed = true,
             Command::Disarm { force } if force || self.on_ground() && self.finds_ground => self.armed = false,
@@ -81,6 +86,15 @@ impl Copter {
             Command::Arm | Command::Disarm { .. } | Command::TakeOff { .. } => return no("failed"),
         }
         Ok(())
+    }
+
+    fn target(&mut self, setpoint: Setpoint) {
+        if setpoint.position_ned_m.xy().norm() <= self.fence_m {
+            self.setpoint = Some(setpoint);
+        } else if let Some(before) = &mut self.setpoint {
+            // Its own goes on without an update, and is then stood at.
+            before.velocity_ned_mps = Vector3::zeros();
+        }
     }
 
     fn step(&mut self, dt: f64) {
@@ -216,6 +230,7 @@ impl World {
             boot_s: 100.0,
             rangefinder: None,
             waves: (0.0, 4.0),
+            fence_m: f64::INFINITY,
             finds_ground: true,
             home: Vector3::new(home.0, home.1, 0.0),
             surface_z: 0.0,
@@ -316,7 +331,7 @@ impl World {
             self.outputs[index] = executor.step(self.now);
             for output in &self.outputs[index] {
                 match output {
-                    Output::Setpoint(setpoint) => self.copters[index].setpoint = Some(*setpoint),
+                    Output::Setpoint(setpoint) => self.copters[index].target(*setpoint),
                     Output::Request(command) => {
                         let outcome = self.copters[index].take(*command);
                         executor.observe_outcome(command, &outcome, self.now);

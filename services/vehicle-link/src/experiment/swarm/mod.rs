@@ -40,6 +40,8 @@ const HEIGHT_M: f64 = 8.0;
 pub struct SwarmReport {
     /// Least true distance between any two, metres.
     pub least_m: f64,
+    /// How often an autopilot was thought not to follow its targets, which all of these do.
+    pub unheeded: u32,
     /// Root mean square of the followers' true horizontal distances from their slots while all was well, metres; `NaN` if it never
     /// was.
     pub slot_rms_m: f64,
@@ -66,6 +68,7 @@ struct Swarm {
     next_goal: Option<Stamp>,
     stranger_goal: Vector3<f64>,
     least_m: f64,
+    unheeded: u32,
     slot_m2: f64,
     settled: u64,
     samples: u64,
@@ -109,6 +112,7 @@ pub fn fly(scenario: &SwarmScenario) -> Option<SwarmReport> {
     }
     Some(SwarmReport {
         least_m: swarm.least_m,
+        unheeded: swarm.unheeded,
         slot_rms_m: (swarm.slot_m2 / swarm.settled as f64).sqrt(),
         settled_fraction: swarm.settled as f64 / swarm.samples.max(1) as f64,
     })
@@ -164,6 +168,7 @@ impl Swarm {
             next_goal: None,
             stranger_goal: Vector3::new(90.0, 0.0, -HEIGHT_M),
             least_m: f64::INFINITY,
+            unheeded: 0,
             slot_m2: 0.0,
             settled: 0,
             samples: 0,
@@ -279,8 +284,10 @@ impl Swarm {
         executor.complete(&mut state);
         executor.observe_self(state.clone(), now, now);
         for output in executor.step(now) {
-            if let Output::Setpoint(setpoint) = output {
-                craft.setpoint = Some(setpoint);
+            match output {
+                Output::Setpoint(setpoint) => craft.setpoint = Some(setpoint),
+                Output::Note(note) if note.why.contains("does not follow its targets") => self.unheeded += 1,
+                _ => {}
             }
         }
         executor.complete(&mut state);

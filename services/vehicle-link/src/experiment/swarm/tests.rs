@@ -16,6 +16,7 @@ fn least_m(name: &str, seeds: u64, scenario: impl Fn(u64) -> SwarmScenario + Syn
         .into_par_iter()
         .map(|seed| {
             let report = fly(&scenario(seed)).expect("vehicles");
+            assert_eq!(report.unheeded, 0, "seed {seed}: an autopilot was thought not to follow");
             (report.least_m, seed, report.slot_rms_m)
         })
         .collect();
