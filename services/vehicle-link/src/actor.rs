@@ -10,10 +10,12 @@ use std::time::Duration;
 use anyhow::bail;
 use halcyon_chassis::{Context, EventDraft, Incoming, Publisher, topics};
 use halcyon_model::{CommandReply, Stamp, VehicleAction, VehicleCommand, VehicleId, VehicleState};
+use tokio_util::sync::CancellationToken;
 use tracing::{debug, info, trace, warn};
 
 use crate::autopilot::Autopilot;
 use crate::config::{Config, Signing};
+use crate::core::coasting;
 use crate::core::commands::{Command, CommandError, Effect, Ticket};
 use crate::core::encode;
 use crate::core::executor::{Decision, Executor, ExecutorConfig, Output, PlanAnswer, word};
@@ -22,12 +24,17 @@ use crate::core::transfers::Ending;
 use crate::io::key;
 use crate::io::link::{Link, LinkEvent, LinkOptions};
 
+/// What the service asks for itself; nobody waits for it.
+const OWN_TICKET: Ticket = 0;
 /// Commands that wait for the autopilot's answer at once; more are refused.
 const WAITING_MAX: usize = 16;
 /// However often a leader speaks, guidance steps no more often than this, seconds.
 const STEP_S_MIN: f64 = 0.02;
 /// People are told how far a long transfer is this often, seconds.
 const TELL_S: f64 = 5.0;
+/// The last target is sent so often, so far apart.
+const FAREWELLS: usize = 3;
+const FAREWELL: Duration = Duration::from_millis(30);
 /// A greater share of lost frames is told.
 const LOSS_MAX: f64 = 0.2;
 /// So long after the last frame with a foreign signature that is still told, seconds.
@@ -43,7 +50,10 @@ pub async fn run(context: Context, config: Config) -> anyhow::Result<()> {
     let mut others = context.bus.subscribe(&topics::vehicle_states()).await?;
     let mut commands = context.bus.serve(&topics::vehicle_command(&vehicle)).await?;
     let states = context.bus.publisher(&topics::vehicle_state(&vehicle)).await?;
-    let mut link = Link::start(link_options(&config)?, context.clock.clone(), context.stop.child_token());
+    // Ends after everything else, so that the last target is still sent.
+    let link_stop = CancellationToken::new();
+    let _link_ends = link_stop.clone().drop_guard();
+    let mut link = Link::start(link_options(&config)?, context.clock.clone(), link_stop);
     let mut guidance = context.clock.every(Duration::from_secs_f64(1.0 / config.guidance_rate_hz));
     let mut publishing = context.clock.every(Duration::from_secs_f64(1.0 / config.state_rate_hz));
     let mut heartbeat = context.clock.every(Duration::from_secs(1));
@@ -51,11 +61,12 @@ pub async fn run(context: Context, config: Config) -> anyhow::Result<()> {
     info!(vehicle = config.vehicle, endpoint = config.endpoint, "vehicle link starts");
     loop {
         tokio::select! {
-            () = context.stop.cancelled() => return Ok(()),
+            () = context.stop.cancelled() => {
+                service.leave(&link).await;
+                return Ok(());
+            }
             event = link.recv() => match event {
                 Some(event) => service.observe_link(event, &link).await,
-                // Told to stop, the link's task may be the first to hear it.
-                None if context.stop.is_cancelled() => return Ok(()),
                 None => bail!("the link's task has ended"),
             },
             plan = plans.recv() => {
@@ -153,6 +164,7 @@ impl<'a> Service<'a> {
                 if let Some(system) = heard.found {
                     self.link_problem = None;
                     self.event(EventDraft::info("autopilot found", format!("MAVLink system {system}"))).await;
+                    self.autopilot.ask_coasting(OWN_TICKET, now);
                 }
                 if let Some(text) = heard.text {
                     info!(vehicle = %self.vehicle, "autopilot: {text}");
@@ -202,6 +214,17 @@ impl<'a> Service<'a> {
         }
     }
 
+    /// Nobody will guide any more: has the vehicle stop, and waits until that is sent.
+    async fn leave(&self, link: &Link) {
+        let now = self.context.clock.now();
+        let Some(message) = self.executor.farewell(now).and_then(|stop| self.autopilot.setpoint(&stop, now)) else { return };
+        // One of them may be lost.
+        for _ in 0..FAREWELLS {
+            link.send(self.autopilot.header(), message.clone());
+            self.context.clock.sleep(FAREWELL).await;
+        }
+    }
+
     /// One guidance step, and whatever the command protocol has due.
     async fn step(&mut self, now: Stamp, link: &Link) {
         self.stepped = Some(now);
@@ -242,6 +265,11 @@ impl<'a> Service<'a> {
                 Effect::Done(_, Command::SetInterval(stream), outcome) => {
                     if let Err(error) = outcome {
                         debug!(message_id = stream.message_id, %error, "stream not set");
+                    }
+                }
+                Effect::Transferred(OWN_TICKET, ending) => {
+                    if let Some(why) = coasting::problem(&ending) {
+                        self.event(EventDraft::warning("the autopilot flies on for long without us", why)).await;
                     }
                 }
                 Effect::Transferred(ticket, ending) => {

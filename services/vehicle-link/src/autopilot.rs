@@ -6,6 +6,7 @@ use mavlink::dialects::ardupilotmega::{MavAutopilot, MavMessage};
 use mavlink::{MavHeader, Message as _};
 
 use crate::config::Config;
+use crate::core::coasting;
 use crate::core::commands::{Command, CommandError, Commands, Effect, Refusal, Ticket};
 use crate::core::encode::{self, Address, Datum};
 use crate::core::guidance::Setpoint;
@@ -244,6 +245,15 @@ impl Autopilot {
         self.transfers.submit(ticket, request, deadline)
     }
 
+    /// Asks ArduPilot for what its behaviour depends on, as [`super::core::coasting`] says; the answer bears `ticket`.
+    pub fn ask_coasting(&mut self, ticket: Ticket, now: Stamp) {
+        const ANSWER_S: f64 = 3.0;
+        if let Some(request) = coasting::request().filter(|_| self.identity.family() == Family::ArduPilot) {
+            // Without an answer nothing is told.
+            let _ = self.transfer(ticket, request, now.plus_secs_f64(ANSWER_S));
+        }
+    }
+
     /// What a transfer has to send or to tell now.
     pub fn poll_transfers(&mut self, now: Stamp) -> Vec<Effect> {
         self.address.map_or_else(Vec::new, |address| self.transfers.poll(address, now))
@@ -287,6 +297,9 @@ impl Autopilot {
             if let Err(error) = self.commands.submit(ticket, command) {
                 effects.push(Effect::Done(ticket, command, Err(error)));
             }
+        }
+        if let (Some((mode, armed)), Some(heard)) = (self.telemetry.mode_and_armed(), self.telemetry.heartbeat_heard()) {
+            self.commands.observe_heartbeat(mode, armed, heard);
         }
         effects.extend(self.commands.poll(address, &self.texts, now));
         if family == Family::Px4 {

@@ -239,6 +239,23 @@ impl Commands {
         open.answered(ack, result, refusal, now);
     }
 
+    /// The autopilot's heartbeat, which came at `heard`. What it shows to be done is not asked for again, though no acknowledgement came: the
+    /// pilot may undo it any moment.
+    pub fn observe_heartbeat(&mut self, mode: FlightMode, armed: bool, heard: Stamp) {
+        for open in &mut self.open {
+            let done = match open.command {
+                Command::Arm => armed,
+                Command::Disarm { .. } => !armed,
+                Command::SetMode(wanted) => mode == wanted,
+                Command::TakeOff { .. } | Command::SetHome | Command::SetInterval(_) | Command::Payload(_) => false,
+            };
+            let asked = matches!(open.phase, Phase::Sent { .. } | Phase::InProgress { .. });
+            if done && asked && open.sent.is_some_and(|sent| sent < heard) {
+                open.phase = Phase::Accepted;
+            }
+        }
+    }
+
     /// Sends what is due, ends what has ended.
     pub fn poll(&mut self, to: Address, texts: &Texts, now: Stamp) -> Vec<Effect> {
         let mut effects = Vec::new();
@@ -530,6 +547,26 @@ mod tests {
         }
         assert_eq!(seen, [0, 1, 2, 3]);
         assert_eq!(outcome, Some((40, Err(CommandError::TimedOut { tries: 4, percent: None }))));
+    }
+
+    /// The acknowledgement is lost, the heartbeat shows it done: whoever undoes it then is not fought with a retry. A heartbeat from before it was sent
+    /// shows nothing.
+    #[test]
+    fn what_the_heartbeat_shows_to_be_done_is_not_asked_for_again() {
+        let (guided, loiter) = (FlightMode::Guided, FlightMode::Loiter);
+        for command in [Command::Arm, Command::SetMode(guided), Command::Disarm { force: false }] {
+            let mut commands = Commands::default();
+            commands.submit(1, command).unwrap();
+            commands.poll(to(), &Texts::default(), t(0.0));
+            let armed = command == Command::Arm;
+            commands.observe_heartbeat(guided, armed, t(-0.5));
+            assert!(commands.poll(to(), &Texts::default(), t(0.1)).is_empty());
+            commands.observe_heartbeat(guided, armed, t(0.5));
+            assert!(matches!(commands.poll(to(), &Texts::default(), t(0.6))[..], [Effect::Done(1, _, Ok(()))]));
+            commands.observe_heartbeat(loiter, !armed, t(0.8));
+            let later = (7..100).flat_map(|step| commands.poll(to(), &Texts::default(), t(0.1 * f64::from(step))));
+            assert_eq!(later.count(), 0);
+        }
     }
 
     #[test]

@@ -5,6 +5,8 @@ use halcyon_model::{FlightMode, Stamp};
 
 /// A mode that we asked for is ours if it comes within this time, seconds.
 const EXPECT_S: f64 = 8.0;
+/// GUIDED that we asked for before the pilot took over may come so late, seconds: he hands nothing back with it.
+const LATE_S: f64 = 5.0;
 
 /// What a new observation changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,6 +26,8 @@ pub enum Change {
 pub struct Control {
     last: Option<(FlightMode, bool)>,
     expected: Option<(FlightMode, Stamp)>,
+    /// When we asked for a GUIDED that hasn't come.
+    unanswered: Option<Stamp>,
     ours: Option<FlightMode>,
     hands_off: bool,
     since_start: bool,
@@ -35,6 +39,7 @@ impl Control {
     /// We are about to ask for a mode.
     pub fn expect(&mut self, mode: FlightMode, now: Stamp) {
         self.expected = Some((mode, now));
+        self.unanswered = (mode == FlightMode::Guided).then_some(now);
     }
 
     /// Whether Halcyon must keep its hands off.
@@ -59,18 +64,25 @@ impl Control {
     /// Hands off until GUIDED is set, whatever the mode is: the autopilot started again in flight, and nobody asked for the mode that
     /// it comes up in; or a person's ground station flies it.
     pub fn let_go(&mut self) {
-        *self = Self { last: self.last, hands_off: true, must_be_set: true, ..Self::default() };
+        *self = Self { last: self.last, unanswered: self.unanswered, hands_off: true, must_be_set: true, ..Self::default() };
     }
 
     /// Our clock went back.
     pub fn clock_went_back(&mut self, by_s: f64) {
         self.expected = self.expected.map(|(mode, at)| (mode, at.plus_secs_f64(-by_s)));
+        self.unanswered = self.unanswered.map(|at| at.plus_secs_f64(-by_s));
     }
 
     /// Takes the present mode as our own.
     pub fn adopt(&mut self) {
         self.ours = self.last.map(|last| last.0);
         self.hands_off = false;
+    }
+
+    /// Whether this is the GUIDED that we asked for before the pilot took over.
+    fn is_late(&self, mode: FlightMode, now: Stamp) -> bool {
+        let late = self.unanswered.is_some_and(|at| (0.0..LATE_S).contains(&now.seconds_since(at)));
+        self.hands_off && mode == FlightMode::Guided && late
     }
 
     /// Takes the observed mode.
@@ -87,8 +99,12 @@ impl Control {
         } else if self.expected.is_some_and(|(expected, _)| expected == mode) {
             self.ours = Some(mode);
             self.expected = None;
+            self.unanswered = None;
             self.hands_off = false;
             self.must_be_set = false;
+        } else if self.is_late(mode, now) && changed {
+            self.unanswered = None;
+            self.must_be_set = true;
         } else if mode == FlightMode::Guided && (changed || !self.must_be_set) {
             // Whoever set it: this is how the vehicle is handed back.
             self.hands_off = false;
@@ -156,6 +172,21 @@ mod tests {
         assert_eq!(control.observe(Loiter, true, t(1.2)), Change::None);
         assert_eq!(control.observe(Stabilize, true, t(1.4)), Change::ChosenAnew);
         assert!(control.hands_off());
+    }
+
+    /// Our request was on its way when the pilot took over: it sets GUIDED after all, and hands nothing back. What the pilot does then does.
+    #[test]
+    fn guided_that_comes_late_hands_nothing_back() {
+        let mut control = Control::default();
+        control.observe(Land, true, t(0.0));
+        control.adopt();
+        control.expect(Guided, t(1.0));
+        assert_eq!(control.observe(Loiter, true, t(1.2)), Change::TakenOver);
+        assert_eq!(control.observe(Guided, true, t(1.4)), Change::ChosenAnew);
+        control.observe(Guided, true, t(9.0));
+        assert!(control.hands_off());
+        control.observe(Loiter, true, t(10.0));
+        assert_eq!(control.observe(Guided, true, t(11.0)), Change::HandedBack);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! The fail-safes that watch over every flight. Each row names its test, in `tests/failsafes.rs` or `tests/mishaps.rs`.
+//! The fail-safes that watch over every flight. Each row names its test, in `tests/failsafes.rs`, `tests/mishaps.rs`, `tests/heed.rs` or `tests/pilot.rs`.
 //!
 //! | what happens | what it does | until | test |
 //! |---|---|---|---|
@@ -7,6 +7,7 @@
 //! | pilot changes the mode | hands off, commands under way withdrawn | GUIDED is set again | `the_pilot_is_never_fought_and_hands_back_with_guided` |
 //! | a ground station on the relay flies it in GUIDED | the same | the same | `a_ground_station_that_flies_it_in_guided_is_a_pilot` |
 //! | the autopilot's own fail-safe changes it | the same | the same | `the_autopilots_own_fail_safe_is_not_fought_either_and_is_named` |
+//! | somebody stops the motors before a take-off | the same | the same | `motors_that_somebody_stopped_on_the_ground_stay_off_until_guided_is_set` |
 //! | estimator or GNSS bad | stops; then asks for LAND | it is good again, before LAND | `a_bad_estimator_stops_then_lands` |
 //! | battery under the land fraction | LAND where it is | disarmed | `battery_low_returns_and_stays_returning_battery_empty_lands_here` |
 //! | own position jumps | stops on velocity, no setpoint goes after it; then asks for LAND if it jumps on | it has settled and the estimator is good | `a_position_that_jumps_is_not_flown_after_and_is_believed_once_settled` |
@@ -25,6 +26,8 @@
 //! | home moves in flight | said, and flown to where it took off | | `a_home_that_moves_in_flight_is_not_flown_to` |
 //! | another vehicle with the same name | said; no take-off | it is silent | `another_vehicle_with_the_same_name_is_told_and_not_taken_off_beside` |
 //! | rangefinder and autopilot's height disagree in a descent | said, and the safer counts | they agree | `a_rangefinder_that_disagrees_makes_it_careful` |
+//! | a descent sinks no further, though the height says that there is further to go | LAND, and said | | `a_descent_ends_on_the_water_though_the_height_says_that_there_is_further_to_go` |
+//! | this service is stopped in flight | a last target that stops the vehicle | | `the_last_target_stops_the_vehicle` |
 //! | afloat in LAND with motors on | asks to stop them; at the surface by two witnesses and refused, stops them | | `afloat_on_waves_the_motors_stop_though_the_autopilot_finds_no_end` |
 //!
 //! What a landing needs is in [`super::executor`], beside what it interrupts; the others are decided here, the weightiest first.

@@ -2,6 +2,7 @@
 
 pub mod boot;
 pub mod budget;
+pub mod coasting;
 pub mod commands;
 pub mod continuity;
 pub mod control;

@@ -28,6 +28,7 @@ fn by_command(command: MavCmd) -> Option<&'static str> {
         MavCmd::MAV_CMD_CONDITION_YAW => Some("turns it"),
         MavCmd::MAV_CMD_DO_CHANGE_SPEED => Some("changes its speed"),
         MavCmd::MAV_CMD_DO_ORBIT => Some("has it circle"),
+        MavCmd::MAV_CMD_DO_PAUSE_CONTINUE => Some("pauses it"),
         _ => None,
     }
 }

@@ -286,6 +286,12 @@ impl Telemetry {
         self.heartbeat.map(|heartbeat| heartbeat.0.0)
     }
 
+    /// The mode that was last heard, and whether the motors were on.
+    #[must_use]
+    pub fn mode_and_armed(&self) -> Option<(FlightMode, bool)> {
+        self.heartbeat.map(|heartbeat| heartbeat.0)
+    }
+
     /// Altitude of home above mean sea level, metres, by the autopilot's two altitudes.
     #[must_use]
     pub fn home_amsl_m(&self) -> Option<f64> {

@@ -286,7 +286,10 @@ impl Keeper {
             if self.systems.len() < SYSTEMS_MAX || self.systems.contains_key(&system) {
                 self.systems.entry(system).or_default().observe(frame.version(), now);
             }
-            writer.learn(system, from);
+            if !writer.learn(system, from, now) {
+                metrics::counter!("vehicle_link_frames_rejected_total", "reason" => "another_sender").increment(1);
+                return false;
+            }
         }
         let event = match frame.message() {
             Some(message) => LinkEvent::Message(header, Box::new(message)),

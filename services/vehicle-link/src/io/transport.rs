@@ -7,6 +7,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use halcyon_chassis::Clock;
+use halcyon_model::Stamp;
 use tokio::io::{AsyncRead, AsyncReadExt as _, AsyncWrite, AsyncWriteExt as _};
 use tokio::net::{TcpListener, TcpStream, UdpSocket};
 use tokio_serial::SerialPortBuilderExt as _;
@@ -18,6 +19,8 @@ use crate::endpoint::Endpoint;
 pub(super) const CONNECT: Duration = Duration::from_secs(5);
 /// The largest datagram, and what is read of a stream at once.
 const READ_BYTES: usize = 64 * 1024;
+/// A system may speak from another place once it has been silent at its own for so long, seconds: its radio or its router started anew.
+const MOVED_S: f64 = 3.0;
 /// Vehicles on one UDP socket whose places are remembered.
 const PLACES_MAX: usize = 32;
 
@@ -44,10 +47,10 @@ pub(super) enum Writer {
     },
 }
 
-/// Which system was heard from where: several vehicles may share a socket.
+/// Which system was heard from where, and when last: several vehicles may share a socket.
 #[derive(Debug, Default)]
 pub(super) struct Places {
-    by_system: BTreeMap<u8, SocketAddr>,
+    by_system: BTreeMap<u8, (SocketAddr, Stamp)>,
     last: Option<SocketAddr>,
 }
 
@@ -61,19 +64,27 @@ pub(super) enum To {
 }
 
 impl Places {
-    /// A system spoke from there. A frame that can't be believed must not come here: it would draw ours to its sender.
-    fn learn(&mut self, system: u8, from: SocketAddr) {
+    /// A system spoke from there. A frame that can't be believed must not come here: it would draw ours to its sender. Returns whether the place
+    /// is the system's: while it is heard from one, whoever speaks in its name from another is not it.
+    fn learn(&mut self, system: u8, from: SocketAddr, now: Stamp) -> bool {
+        if let Some((place, heard)) = self.by_system.get(&system)
+            && *place != from
+            && (0.0..MOVED_S).contains(&now.seconds_since(*heard))
+        {
+            return false;
+        }
         self.last = Some(from);
         if self.by_system.len() < PLACES_MAX || self.by_system.contains_key(&system) {
-            self.by_system.insert(system, from);
+            self.by_system.insert(system, (from, now));
         }
+        true
     }
 
     fn of(&self, to: To) -> Vec<SocketAddr> {
         match to {
-            To::System(system) => self.by_system.get(&system).copied().or(self.last).into_iter().collect(),
+            To::System(system) => self.by_system.get(&system).map(|place| place.0).or(self.last).into_iter().collect(),
             To::All => {
-                let mut places: Vec<SocketAddr> = self.by_system.values().copied().collect();
+                let mut places: Vec<SocketAddr> = self.by_system.values().map(|place| place.0).collect();
                 places.sort_unstable();
                 places.dedup();
                 places
@@ -132,10 +143,11 @@ impl Writer {
         }
     }
 
-    /// A believable frame of `system` came from there.
-    pub(super) fn learn(&mut self, system: u8, from: Option<SocketAddr>) {
-        if let (Self::Datagrams { places, .. }, Some(from)) = (self, from) {
-            places.learn(system, from);
+    /// A believable frame of `system` came from there; whether it speaks from there.
+    pub(super) fn learn(&mut self, system: u8, from: Option<SocketAddr>, now: Stamp) -> bool {
+        match (self, from) {
+            (Self::Datagrams { places, .. }, Some(from)) => places.learn(system, from, now),
+            _ => true,
         }
     }
 }
@@ -210,13 +222,18 @@ mod tests {
         let place = |port| SocketAddr::from(([127, 0, 0, 1], port));
         let mut places = Places::default();
         assert!(places.of(To::System(7)).is_empty());
-        places.learn(7, place(1007));
-        places.learn(8, place(1008));
+        let t = |s: f64| Stamp::from_secs_f64(1000.0).plus_secs_f64(s);
+        assert!(places.learn(7, place(1007), t(0.0)) && places.learn(8, place(1008), t(0.0)));
         assert_eq!(places.of(To::System(7)), [place(1007)]);
         assert_eq!(places.of(To::System(9)), [place(1008)], "not heard: whoever spoke last");
         assert_eq!(places.of(To::All), [place(1007), place(1008)]);
+        // In its name from elsewhere, while it speaks itself; once it is silent it may have moved.
+        assert!(!places.learn(7, place(6666), t(2.9)));
+        assert_eq!(places.of(To::System(7)), [place(1007)]);
+        assert!(places.learn(7, place(6666), t(3.1)));
+        assert_eq!(places.of(To::System(7)), [place(6666)]);
         for system in 0..=255 {
-            places.learn(system, place(2000));
+            places.learn(system, place(2000), t(10.0));
         }
         assert!(places.by_system.len() <= PLACES_MAX);
     }

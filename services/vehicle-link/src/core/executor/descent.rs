@@ -27,6 +27,12 @@ const AGREE_M: f64 = 1.0;
 /// At the calm height is no further above it than this, metres.
 const AT_CALM_M: f64 = 0.3;
 
+/// Told to go down, a vehicle that sinks no faster than this for so long stands on something: metres per second, seconds.
+const STOOD_MPS: f64 = 0.05;
+const STOOD_S: f64 = 8.0;
+/// It still has so far to go at least, metres.
+const STOOD_ABOVE_M: f64 = 0.5;
+
 /// What a landing remembers.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Landing {
@@ -36,6 +42,8 @@ pub(super) struct Landing {
     /// Has gone on from there.
     calm_over: bool,
     disagreement_noted: bool,
+    /// Has not sunk for so long, seconds.
+    stood_s: f64,
     afloat: Afloat,
 }
 
@@ -163,8 +171,24 @@ impl Executor {
         let floor_m =
             (step.height_m() - LEAD_DOWN_M).clamp(bottom_m.min(limits.safe_height_m), limits.safe_height_m.max(bottom_m));
         self.drive(at(point, height_m), Vector3::zeros(), None, floor_m, step);
+        if self.stands(goes_down && step.height_m() > bottom_m + STOOD_ABOVE_M, step) {
+            self.request(Command::SetMode(FlightMode::Land), step.now, step.outputs);
+        }
         let calm = if waits { ", waiting for calm" } else { "" };
         self.set(activity, format!("{above_ground_m:.1} m up, {off_m:.1} m off{calm}"));
+    }
+
+    /// Whether it stands on something though the autopilot's height says that there is further to go: a barometer drifts by metres, and without
+    /// a rangefinder nothing else tells. LAND finds the ground, and stops the motors.
+    fn stands(&mut self, goes_down: bool, step: &Step) -> bool {
+        let sinks = !goes_down || step.own.velocity_ned_mps.z > STOOD_MPS;
+        self.landing.stood_s = if sinks { 0.0 } else { self.landing.stood_s + step.dt_s };
+        let stands = self.landing.stood_s >= STOOD_S;
+        if stands && self.landing.stood_s - step.dt_s < STOOD_S {
+            let why = format!("{:.1} m up by the autopilot, and it sinks no further: LAND", step.height_m());
+            self.note(Severity::Warning, "the descent has ended early", why);
+        }
+        stands
     }
 
     /// Whether to wait at the calm height: windows are offered, none is where a descent from there would end, and it hasn't waited
@@ -224,8 +248,10 @@ impl Executor {
         self.landing.afloat.step(step.height_m() - ground_m, by_range_m, step.dt_s);
         let (afloat, afloat_s) = (self.landing.afloat, self.config.fail_safe.afloat_s);
         let sure = afloat.witnessed_s() >= 2.0 * afloat_s && by_range_m.is_some();
-        let refused =
-            self.pending.as_ref().is_some_and(|pending| pending.refused && pending.command == Command::Disarm { force: false });
+        let refused = self
+            .pending
+            .as_ref()
+            .is_some_and(|pending| pending.declined && pending.command == Command::Disarm { force: false });
         if sure && refused {
             let why =
                 format!("on the surface for {:.0} s by height and rangefinder, and the autopilot refused", afloat.for_s());

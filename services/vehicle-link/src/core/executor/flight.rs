@@ -106,7 +106,8 @@ impl Executor {
         self.flying = Some(effective.clone());
         let mut step = Step { own, here_ned_m, dt_s, now, outputs };
         match own.mode {
-            FlightMode::Guided if alarm.as_ref().is_some_and(|alarm| alarm.cause == Cause::Jump && !land_now) => {
+            // Whatever else is the matter, a place that has jumped is not flown by.
+            FlightMode::Guided if self.has_jumped() && alarm.is_some() && !land_now => {
                 self.ride_out(&mut step);
             }
             FlightMode::Guided => self.guide(&effective, &mut step),
@@ -188,18 +189,22 @@ impl Executor {
         self.set(Activity::Descending, "landing here");
     }
 
+    /// Where a vehicle that is at `here_ned_m` now comes to a stop, so that it doesn't fly back; not below the safe height.
+    pub(super) fn stop_ned_m(&self, own: &VehicleState, here_ned_m: Vector3<f64>) -> Vector3<f64> {
+        let limits = &self.config.limits;
+        let velocity = own.velocity_ned_mps;
+        let speed_mps = velocity.xy().norm().min(limits.speed_mps_max);
+        let stop_s = speed_mps / (1.4 * limits.acceleration_mps2);
+        let height_m = (-here_ned_m.z).max(limits.safe_height_m);
+        Vector3::new(here_ned_m.x + velocity.x * stop_s, here_ned_m.y + velocity.y * stop_s, -height_m)
+    }
+
     /// Stops and holds; returns whether settled. Below the safe height it climbs to it.
     pub(super) fn hold(&mut self, heading_rad: Option<f64>, step: &mut Step) -> bool {
         let limits = &self.config.limits;
         let here_ned_m = step.here_ned_m;
-        let held = *self.held.get_or_insert_with(|| {
-            // Where it comes to a stop, so that it doesn't fly back.
-            let velocity = step.own.velocity_ned_mps;
-            let speed_mps = velocity.xy().norm().min(limits.speed_mps_max);
-            let stop_s = speed_mps / (1.4 * limits.acceleration_mps2);
-            let height_m = (-here_ned_m.z).max(limits.safe_height_m);
-            Vector3::new(here_ned_m.x + velocity.x * stop_s, here_ned_m.y + velocity.y * stop_s, -height_m)
-        });
+        let held = self.held.unwrap_or_else(|| self.stop_ned_m(step.own, here_ned_m));
+        self.held = Some(held);
         let floor_m = limits.safe_height_m;
         let (radius_m, settle_s) = (limits.settle_radius_m, limits.settle_s);
         self.drive(held, Vector3::zeros(), heading_rad, floor_m, step);

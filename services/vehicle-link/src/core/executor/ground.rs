@@ -1,6 +1,6 @@
 //! On the ground: waiting, arming, taking off; and what counts as landed.
 
-use halcyon_model::{Activity, FlightMode, LandedState, LocalPoint, Stamp, VehicleState};
+use halcyon_model::{Activity, FlightMode, LandedState, LocalPoint, Severity, Stamp, VehicleState};
 
 use super::{Climb, Executor, Goal, Output};
 use crate::core::commands::Command;
@@ -93,6 +93,25 @@ impl Executor {
                 self.set(Activity::TakingOff, format!("to {height_m:.1} m"));
             }
         }
+    }
+
+    /// Whether somebody else stopped the motors that we had started to take off with: in a mode of ours, and not at our request.
+    pub(super) fn stopped_by_others(&self, state: &VehicleState) -> bool {
+        let were_on = self.own.as_ref().is_some_and(|own| own.state.armed);
+        let asked =
+            self.pending.as_ref().is_some_and(|pending| matches!(pending.command, Command::Disarm { .. }) && !pending.failed);
+        let to_fly = matches!(self.activity, Activity::Preparing | Activity::TakingOff);
+        were_on && !state.armed && !self.airborne && to_fly && !asked && self.may_take_off_in(state)
+    }
+
+    /// Hands off until GUIDED is set: starting the motors again would be a fight with whoever stopped them, who may stand beside them.
+    pub(super) fn stands_down(&mut self) {
+        self.control.let_go();
+        self.withdraw = true;
+        self.pending = None;
+        self.take_off = TakeOff::default();
+        self.flown = self.goal();
+        self.note(Severity::Warning, "the motors were stopped, not by us", "it does not take off until GUIDED is set");
     }
 
     /// Whether it may be armed and told to take off in its present mode. PX4's HOLD is anybody's: only once we have asked for it, it is

@@ -141,7 +141,10 @@ struct PlanSeen {
 struct Pending {
     command: Command,
     at: Stamp,
-    refused: bool,
+    /// It ended, and was not done.
+    failed: bool,
+    /// The autopilot said no, in as many words.
+    declined: bool,
 }
 
 /// The climb that the autopilot flies after NAV_TAKEOFF.
@@ -207,7 +210,7 @@ pub struct Executor {
     landing: Landing,
     notes: Vec<Note>,
     withdraw: bool,
-    /// Home was fixed where it first took off, or the autopilot would not.
+    /// Home was fixed where it first took off, or the autopilot would not; since it started last.
     home_fixed: bool,
     ask_streams: bool,
 }
@@ -303,6 +306,12 @@ impl Executor {
         matches!(&self.flying, Some(Goal::Follow { leader, .. }) if leader == other)
     }
 
+    /// Whether this vehicle is reckoned with.
+    #[must_use]
+    pub fn knows(&self, vehicle: &VehicleId) -> bool {
+        self.neighbours.contains_key(vehicle)
+    }
+
     /// Another vehicle's state.
     pub fn observe_neighbour(&mut self, state: VehicleState, now: Stamp) {
         self.watch_clock(now);
@@ -315,7 +324,7 @@ impl Executor {
         self.watch_other(&state, now);
         if let Some(track) = self.neighbours.get_mut(&state.vehicle) {
             track.observe(state, now);
-        } else if self.neighbours.len() < NEIGHBOURS_MAX {
+        } else if self.has_room_for_another(now) {
             self.neighbours.insert(state.vehicle.clone(), Track::new(state, now));
         }
     }
@@ -326,6 +335,7 @@ impl Executor {
         self.watch_self(&state, now);
         self.landing.surface.observe(&state);
         let first = self.own.is_none();
+        let stopped = self.stopped_by_others(&state);
         if self.is_autopilots_own_change(&state) {
             self.control.expect(state.mode, now);
         }
@@ -350,6 +360,9 @@ impl Executor {
                 }
                 self.note(Severity::Info, "the vehicle was handed back", mode_name(state.mode));
             }
+        }
+        if stopped {
+            self.stands_down();
         }
         let was_airborne = self.airborne;
         self.airborne = is_airborne(&state);
@@ -401,12 +414,13 @@ impl Executor {
         if let Command::TakeOff { .. } = command {
             self.take_off.answered(outcome.is_ok());
         }
+        let declined = matches!(outcome, Err(CommandError::Refused { .. }));
         if *command == Command::SetHome {
             // Refused, it is as without: the autopilot takes home where it is armed.
-            self.home_fixed = true;
+            self.home_fixed |= outcome.is_ok() || declined;
         }
         if let (true, Err(error)) = (ours, outcome) {
-            self.pending = Some(Pending { command: *command, at: now, refused: true });
+            self.pending = Some(Pending { command: *command, at: now, failed: true, declined });
             self.detail = error.to_string();
             let what = format!("{} was not done: {error}", describe(command));
             if *error != CommandError::Withdrawn && self.refusal_noted.as_ref() != Some(&what) {
@@ -415,8 +429,23 @@ impl Executor {
             }
         } else if ours {
             // Accepted: what it brings is observed. Asked again only if that doesn't come.
-            self.pending = Some(Pending { command: *command, at: now, refused: false });
+            self.pending = Some(Pending { command: *command, at: now, failed: false, declined: false });
         }
+    }
+
+    /// The last target, for when nobody will guide any more: to stop, and stay. Without it the autopilot would fly on at the last velocity until
+    /// its own timeout. `None` where it is not flown by targets now.
+    #[must_use]
+    pub fn farewell(&self, now: Stamp) -> Option<Setpoint> {
+        let own = &self.own.as_ref()?.state;
+        let flown = self.reference.is_some() && own.mode == FlightMode::Guided && self.airborne && !self.control.hands_off();
+        let age_s = now.seconds_since(own.stamp).clamp(0.0, 0.5);
+        flown.then(|| Setpoint {
+            position_ned_m: self.stop_ned_m(own, own.position_ned_m + own.velocity_ned_mps * age_s),
+            velocity_ned_mps: Vector3::zeros(),
+            acceleration_ned_mps2: None,
+            heading_rad: None,
+        })
     }
 
     /// One guidance step. Call at about 10 Hz.
@@ -518,15 +547,15 @@ impl Executor {
         if let Some(pending) = &self.pending {
             let same = pending.command == command;
             // A new wish waits for the old one's answer, unless that is overdue: the transaction layer gives up within 5 s.
-            let wait_s = if same || pending.refused { AGAIN_S } else { 0.5 };
-            if (same || !pending.refused) && now.seconds_since(pending.at) < wait_s {
+            let wait_s = if same || pending.failed { AGAIN_S } else { 0.5 };
+            if (same || !pending.failed) && now.seconds_since(pending.at) < wait_s {
                 return;
             }
         }
         if let Command::SetMode(mode) = command {
             self.control.expect(mode, now);
         }
-        self.pending = Some(Pending { command, at: now, refused: false });
+        self.pending = Some(Pending { command, at: now, failed: false, declined: false });
         outputs.push(Output::Request(command));
     }
 

@@ -22,6 +22,8 @@ const HELD_UP_S: f64 = 5.0;
 const HOME_MOVED_M: f64 = 5.0;
 /// The home that the autopilot sets when it arms may be heard so late, seconds after it left the ground.
 const HOME_LATE_S: f64 = 5.0;
+/// A vehicle that has been silent for so long is forgotten if another wants its place, seconds.
+const FORGOTTEN_S: f64 = 60.0;
 /// Own stamps remembered, to know our own voice by: several seconds of them.
 const OWN_STAMPS_MAX: usize = 128;
 /// So many states under our name that we didn't say are another vehicle's; and it is gone after so long a silence, seconds.
@@ -180,6 +182,7 @@ impl Executor {
         self.withdraw = true;
         self.ask_streams = true;
         self.pending = None;
+        self.home_fixed = false;
         self.watch.position = JumpWatch::default();
         self.note(severity, what, "hands off until GUIDED is set");
     }
@@ -221,6 +224,11 @@ impl Executor {
         Some(jumped.by_m.norm())
     }
 
+    /// Whether our own position jumped and has not settled.
+    pub(super) fn has_jumped(&self) -> bool {
+        self.watch.jumped.is_some()
+    }
+
     /// Down: what was watched in flight is over.
     pub(super) fn watch_over(&mut self) {
         self.watch.jumped = None;
@@ -253,9 +261,25 @@ impl Executor {
         self.settle.reset();
     }
 
+    /// Whether one more vehicle can be remembered. What has long been silent and was parked, or is silent for minutes, is forgotten for it.
+    pub(super) fn has_room_for_another(&mut self, now: Stamp) -> bool {
+        if self.neighbours.len() >= super::NEIGHBOURS_MAX {
+            let silent = self.neighbours.iter().map(|(vehicle, track)| (track.unheard_s(now), vehicle));
+            let longest = silent.filter(|(unheard_s, _)| *unheard_s >= FORGOTTEN_S).max_by(|a, b| a.0.total_cmp(&b.0));
+            if let Some(vehicle) = longest.map(|(_, vehicle)| vehicle.clone()) {
+                self.neighbours.remove(&vehicle);
+                self.watch.others.remove(&vehicle);
+            }
+        }
+        self.neighbours.len() < super::NEIGHBOURS_MAX
+    }
+
     /// Another vehicle's state, before it is taken in.
     pub(super) fn watch_other(&mut self, state: &VehicleState, now: Stamp) {
         if !self.watch.others.contains_key(&state.vehicle) {
+            if self.watch.others.len() >= super::NEIGHBOURS_MAX {
+                self.watch.others.retain(|vehicle, _| self.neighbours.contains_key(vehicle));
+            }
             if self.watch.others.len() >= super::NEIGHBOURS_MAX {
                 return;
             }

@@ -7,5 +7,6 @@ mod formation;
 mod heed;
 mod mishaps;
 mod payload;
+mod pilot;
 mod properties;
 mod world;
