@@ -54,7 +54,7 @@ fn safe_is_seldom_wrong() {
 
 #[test]
 fn water_a_fifth_below_the_limits_is_called_safe_within_a_minute() {
-    let count = seas(3000) / 10;
+    let count = seas(600) / 2;
     let drawn = draws(count, |_| 0.8);
     let all = tally(drawn.iter());
     for (i, what) in ["H_m0", "H_1/10", "slope"].iter().enumerate() {
@@ -72,8 +72,7 @@ fn water_a_fifth_below_the_limits_is_called_safe_within_a_minute() {
         "{safe} of {count} seas a fifth below the limits are safe, {} were at some time; withheld for {why:?}",
         all.safe_ever
     );
-    // 95 % are wanted and 88 % reached. A minute of waves of 1 to 1.5 s leaves H_m0 open by 5.6 % whatever is done (4 % at 1 s, 7 % at 1.5 s:
-    // the square of the spectrum and the gauges' coherence over the square of its integral), and an upper 97.5 % bound that has to be 2 % under
-    // the limit then passes in 95 % of seas with nothing else uncertain.
-    assert!(safe * 100 >= 85 * count, "{safe} of {count}: {why:?}");
+    // 95 % are wanted, and reached over many: of 300, two deviations fewer may be. A minute of waves of 1 to 1.5 s leaves H_m0 open by 5.6 % whatever
+    // is done (4 % at 1 s, 7 % at 1.5 s: the square of the spectrum and the gauges' coherence over the square of its integral).
+    assert!(safe * 100 >= 92 * count, "{safe} of {count}: {why:?}");
 }

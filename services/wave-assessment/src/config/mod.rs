@@ -88,7 +88,7 @@ impl Default for Config {
             h_highest_m_max: 0.30,
             slope_rms_rad_max: 0.12,
             landing_s: 20.0,
-            hysteresis: 0.02,
+            hysteresis: 0.01,
             airframe: AirframeConfig::default(),
         }
     }

@@ -6,7 +6,7 @@ use super::patch::cell;
 use super::smooth::{SMOOTHINGS, Smoother};
 
 /// Gauges along each side of the layout.
-const SIDE: usize = 3;
+pub(crate) const SIDE: usize = 3;
 /// The outer ones are this share of a side from the edges: a vehicle that holds its place sways.
 const MARGIN: f64 = 0.15;
 /// Gauges at work at once.

@@ -1,51 +1,77 @@
 //! How much a finite window can tell: degrees of freedom of the pooled variance.
 
-use super::gauge::GAUGES;
+use std::collections::BTreeMap;
+use std::f64::consts::FRAC_PI_2;
+
+use super::gauge::{GAUGES, SIDE};
 use super::series::Series;
 
 /// Correlations further apart than this many mean periods are taken as nothing.
-const LAG_PERIODS: f64 = 5.0;
-/// The degrees of freedom come from the same short window as the variance; so much of them is claimed. The upper bound of H_m0 is then under the truth in
-/// 2.7 of 100 made seas with noise and gaps; with all of it claimed it was in 3 to 4.
-const CLAIMED: f64 = 0.9;
+const LAG_PERIODS: f64 = 3.0;
+/// The degrees of freedom ν come from the same window as the variance, and are the less known the fewer they are: ν²/(ν + 10) are claimed.
+const UNCLAIMED: f64 = 10.0;
+/// ∫ S² df / m0² over T_z for JONSWAP with γ = 3.3, as its spectrum gives it up to five times the peak's frequency. That over the duration is what a wind
+/// sea leaves open of the squared variance at one gauge. Seas that are more narrow leave more; a window that claims less is not believed, since the
+/// waves that make it low make the variance low with it.
+const JONSWAP: f64 = 1.9;
 /// Lags reach at least this far, seconds.
 const LAG_S_MIN: f64 = 2.0;
 
 /// Equivalent degrees of freedom of the variance pooled over all gauges: 2 / CV².
 ///
-/// For a Gaussian surface the variance of that estimate is (2/T) ∫ R²(τ) dτ with R² the mean of all pairs of gauges' squared
-/// covariances (Bendat & Piersol, 8.2.2): neighbours that see the same waves, now or a moment later, count as one. Sample
-/// covariances are noisy, and their squares biased by about (1/T) ∫ R² each; that is taken off. Half of it is the number of
-/// independent waves that the window is worth. `None` without data.
+/// For a Gaussian surface the variance of that estimate is (2/T) ∫ ρ²(τ) dτ of its square, with ρ² the mean of all pairs of gauges' squared
+/// correlations (Bendat & Piersol, 8.2.2): neighbours that see the same waves, now or a moment later, count as one. Half of it is the
+/// number of independent waves that the window is worth. `None` without data.
+///
+/// Correlations come from signs alone: of a Gaussian surface ρ = sin(π/2 r), with r the correlation of the signs (the arcsine law; Van Vleck &
+/// Middleton 1966). A group of high waves that came by chance makes the variance too large; it would make the correlations of elevations too
+/// large with it, and low variances too sure of themselves. It does not change the signs. And signs are counted 64 at a time.
+///
+/// The sea under the gauges is the same everywhere, and so pairs that lie as far apart in the same direction share one correlation. Estimates are noisy,
+/// and their squares too large for it, by lags/T of the like integral of (π/2 r)² over the same gauges; that is taken off.
 pub(crate) fn degrees_of_freedom(series: &Series, interval_s: f64, period_s: Option<f64>) -> Option<f64> {
     let (table, length) = table(series, interval_s);
-    let used: Vec<Gauge> = table.into_iter().flatten().map(|elevation_m| Gauge::of(&elevation_m)).collect();
+    let used: Vec<Gauge> = table.into_iter().enumerate().filter_map(|(slot, row)| Some(Gauge::of(slot, &row?))).collect();
     let gauges = used.len() as f64;
     let duration_s = length as f64 * interval_s;
     let lag_s = (LAG_PERIODS * period_s.unwrap_or(0.0)).max(LAG_S_MIN).min(duration_s / 3.0);
     let lag_max = (lag_s / interval_s).round() as usize;
-    if used.is_empty() || lag_max == 0 || lag_max >= length {
+    if !used.iter().any(|gauge| gauge.varies) || lag_max == 0 || lag_max >= length {
         return None;
     }
-    let variance = used.iter().map(|x| covariance(x, x, 0)).sum::<f64>() / gauges;
-    if variance <= 0.0 {
-        return None;
+    let mut pairs: BTreeMap<Separation, Vec<[&Gauge; 2]>> = BTreeMap::new();
+    for (a, b) in used.iter().flat_map(|a| used.iter().map(move |b| (a, b))) {
+        pairs.entry(separation(a, b)).or_default().push([a, b]);
     }
-    let (mut all, mut own) = (0.0, 0.0);
-    for (i, a) in used.iter().enumerate() {
-        for (j, b) in used.iter().enumerate() {
-            let squares: f64 = (0..=lag_max).map(|lag| covariance(a, b, lag).powi(2) * if lag == 0 { 1.0 } else { 2.0 }).sum();
-            all += squares;
-            own += if i == j { squares } else { 0.0 };
-        }
-    }
-    let scale = 2.0 * interval_s / (duration_s * variance * variance);
-    let (all, own) = (all * scale / (gauges * gauges), own * scale / gauges);
-    let bias = 2.0 * lag_max as f64 * interval_s / duration_s;
-    let own = own / (1.0 + bias);
+    let squares: BTreeMap<Separation, Squares> =
+        pairs.iter().map(|(apart, of)| (*apart, Squares::of(of, lag_max, length))).collect();
+    let of = |a: &Gauge, b: &Gauge| squares.get(&separation(a, b)).copied().unwrap_or_default();
+    // Mean of what spoils the squares, over all pairs of some gauges.
+    let noise = |some: &[[&Gauge; 2]]| {
+        let each = some.iter().map(|[a, _]| some.iter().map(|[b, _]| of(a, b).signs).sum::<f64>());
+        each.sum::<f64>() / (some.len() * some.len()) as f64
+    };
+    let lags = 2.0 * lag_max as f64 * interval_s / duration_s;
+    let unspoilt = |(apart, some): (&Separation, &Vec<[&Gauge; 2]>)| {
+        let found = squares.get(apart).map_or(0.0, |squares| squares.waves);
+        some.len() as f64 * (found - lags / (1.0 + lags) * noise(some))
+    };
+    let scale = 2.0 * interval_s / duration_s;
+    let all = pairs.iter().map(unspoilt).sum::<f64>() * scale / (gauges * gauges);
+    let own = squares.get(&(0, 0))?.waves / (1.0 + lags) * scale;
+    // A window whose waves forget each other sooner than those of a wind sea does so by chance.
+    let wider = (JONSWAP * period_s.unwrap_or(0.0) / duration_s / own).max(1.0);
     // No better than gauges that know nothing of each other, no worse than one.
-    let cv_squared = (all - bias * own).clamp(own / gauges, own);
-    Some(CLAIMED * 2.0 / cv_squared)
+    let cv_squared = wider * all.clamp(own / gauges, own);
+    let freedom = 2.0 / cv_squared;
+    Some(freedom * freedom / (freedom + UNCLAIMED))
+}
+
+/// How many places of the layout one gauge lies from another, along its rows and columns.
+type Separation = (isize, isize);
+
+fn separation(a: &Gauge, b: &Gauge) -> Separation {
+    (b.place.0 - a.place.0, b.place.1 - a.place.1)
 }
 
 /// Each gauge's elevation at 0, 1, 2 … intervals since the window began; NaN where there is none. And how many intervals.
@@ -64,39 +90,65 @@ fn table(series: &Series, interval_s: f64) -> ([Option<Vec<f64>>; GAUGES], usize
     (table, length)
 }
 
-/// One gauge's elevations, nothing where they are not known, and where they are.
+/// Where one gauge's elevations are known, and where they are above the mean level; its place in the layout.
 struct Gauge {
-    elevation_m: Vec<f64>,
-    known: Vec<f64>,
+    place: (isize, isize),
+    varies: bool,
+    known: Vec<u64>,
+    above: Vec<u64>,
 }
 
 impl Gauge {
-    fn of(elevation_m: &[f64]) -> Self {
-        let known = elevation_m.iter().map(|x| f64::from(u8::from(!x.is_nan()))).collect();
-        Self { elevation_m: elevation_m.iter().map(|x| if x.is_nan() { 0.0 } else { *x }).collect(), known }
-    }
-}
-
-/// Mean of a(t) b(t + lag) where both are known, weighted down as lags get longer, so that far ones do not run wild. What is missing here and there
-/// makes a mean no smaller: it would pass for waves that soon forget each other.
-fn covariance(a: &Gauge, b: &Gauge, lag: usize) -> f64 {
-    let pairs = lagged(&a.known, &b.known, lag);
-    let length = a.known.len() as f64;
-    if pairs > 0.0 { lagged(&a.elevation_m, &b.elevation_m, lag) / pairs * (1.0 - lag as f64 / length) } else { 0.0 }
-}
-
-/// Sum of a(t) b(t + lag).
-fn lagged(a: &[f64], b: &[f64], lag: usize) -> f64 {
-    const LANES: usize = 8;
-    let later = b.get(lag..).unwrap_or_default();
-    let (ours, theirs) = (a[..later.len().min(a.len())].chunks_exact(LANES), later.chunks_exact(LANES));
-    let rest: f64 = ours.remainder().iter().zip(theirs.remainder()).map(|(x, y)| x * y).sum();
-    // Sums side by side, which the processor takes at once.
-    let mut sums = [0.0; LANES];
-    for (x, y) in ours.zip(theirs) {
-        for ((sum, x), y) in sums.iter_mut().zip(x).zip(y) {
-            *sum += x * y;
+    fn of(slot: usize, elevation_m: &[f64]) -> Self {
+        let bits = |is: fn(f64) -> bool| -> Vec<u64> {
+            let word = |of: &[f64]| of.iter().rev().fold(0, |word, x| (word << 1) | u64::from(is(*x)));
+            elevation_m.chunks(BITS).map(word).collect()
+        };
+        Self {
+            place: ((slot / SIDE) as isize, (slot % SIDE) as isize),
+            varies: elevation_m.iter().any(|x| x.abs() > 0.0),
+            known: bits(|x| !x.is_nan()),
+            above: bits(|x| x > 0.0),
         }
     }
-    rest + sums.iter().sum::<f64>()
+}
+
+const BITS: usize = u64::BITS as usize;
+
+/// Word `i` of what comes `lag` later.
+fn later(words: &[u64], i: usize, lag: usize) -> u64 {
+    let (at, by) = (i + lag / BITS, lag % BITS);
+    let word = |at: usize| words.get(at).copied().unwrap_or(0);
+    if by == 0 { word(at) } else { (word(at) >> by) | (word(at + 1) << (BITS - by)) }
+}
+
+/// Correlation of the signs of a(t) and b(t + lag) over all pairs where both are known.
+fn correlation(pairs: &[[&Gauge; 2]], lag: usize) -> f64 {
+    let (mut known, mut unlike) = (0, 0);
+    for [a, b] in pairs {
+        for (i, (k, s)) in a.known.iter().zip(&a.above).enumerate() {
+            let both = k & later(&b.known, i, lag);
+            known += both.count_ones();
+            unlike += (both & (s ^ later(&b.above, i, lag))).count_ones();
+        }
+    }
+    if known > 0 { 1.0 - 2.0 * f64::from(unlike) / f64::from(known) } else { 0.0 }
+}
+
+/// Sums over all lags, before and after: of the squared correlation of the waves, and of that of their signs, times (π/2)².
+#[derive(Clone, Copy, Default)]
+struct Squares {
+    waves: f64,
+    signs: f64,
+}
+
+impl Squares {
+    fn of(pairs: &[[&Gauge; 2]], lag_max: usize, length: usize) -> Self {
+        (0..=lag_max).fold(Self::default(), |sum, lag| {
+            let angle = FRAC_PI_2 * correlation(pairs, lag);
+            // Far lags are weighted down, so that they do not run wild.
+            let weight = (1.0 - lag as f64 / length as f64).powi(2) * if lag == 0 { 1.0 } else { 2.0 };
+            Self { waves: sum.waves + weight * angle.sin().powi(2), signs: sum.signs + weight * angle.powi(2) }
+        })
+    }
 }

@@ -1,6 +1,11 @@
 //! Checks, gathered one by one.
 
 use halcyon_model::{Estimate, VerdictReason, VerdictState};
+use halcyon_ocean::confidence::{chi_square_quantile, normal_cumulative};
+
+/// An estimate and so much of the way to the end of its two-sided 95 % interval are the upper 95 % bound: that is one-sided, 1.645 deviations
+/// up and not 1.960.
+const ONE_SIDED: f64 = 0.839_252;
 
 /// How a check ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -21,19 +26,25 @@ pub(super) struct Checks {
     made: Vec<(Outcome, VerdictReason)>,
     previous: VerdictState,
     hysteresis: f64,
-    /// Share of the window that was observed so far, as a root: bounds of earlier looks are that much wider.
-    filled_root: f64,
+    /// Share of the window that was observed so far: bounds of earlier looks are that much wider.
+    filled: f64,
+    /// The one-sided upper 95 % bound of a height over the end of its two-sided interval.
+    one_sided: f64,
     /// The smallest probability of any quantity to be under its limit.
     probability: Option<f64>,
 }
 
 impl Checks {
     /// `filled` is the share of the window that was observed so far. One who looks again and again while a window fills is wrong more often than
-    /// each look is; bounds as much wider as the root of the share is less than one make up for it (O'Brien and Fleming 1979).
-    pub(super) fn new(previous: VerdictState, hysteresis: f64, filled: f64) -> Self {
+    /// each look is. Bounds as much wider as the root of the share is less than one would make up for it (O'Brien and Fleming 1979) if it were known how
+    /// wide they are; a short window knows that badly too, and so they are as much wider as the share itself is less than one. `freedom` is that of
+    /// the variance, if it is known.
+    pub(super) fn new(previous: VerdictState, hysteresis: f64, filled: f64, freedom: Option<f64>) -> Self {
         // Written so that what is no share counts as little.
-        let filled_root = if filled >= 1.0 { 1.0 } else { filled.max(0.01).sqrt() };
-        Self { made: Vec::new(), previous, hysteresis, filled_root, probability: None }
+        let filled = if filled >= 1.0 { 1.0 } else { filled.max(0.01) };
+        let ratio = |freedom| (chi_square_quantile(0.025, freedom) / chi_square_quantile(0.05, freedom)).sqrt();
+        let one_sided = freedom.map(ratio).filter(|ratio| ratio.is_finite()).unwrap_or(1.0);
+        Self { made: Vec::new(), previous, hysteresis, filled, one_sided, probability: None }
     }
 
     pub(super) fn add(&mut self, name: &str, outcome: Outcome, text: String) {
@@ -50,11 +61,13 @@ impl Checks {
         self.add(name, if ok { Outcome::Passed } else { Outcome::Failed }, text);
     }
 
-    /// A quantity against its limit. The upper bound must be under it, well under it to become safe; the lower bound over it is known to be
+    /// A quantity against its limit. The upper 95 % bound must be under it, well under it to become safe; the lower bound over it is known to be
     /// too much, and what was too much stays so until the best estimate is under the limit.
     pub(super) fn limit(&mut self, name: &str, what: &str, unit: &str, measured: Estimate, limit: f64) {
         let Estimate { value, low, high } = measured;
-        let sure = value + (high - value) / self.filled_root;
+        // What the interval holds beside chance, as what may be hidden waves or a fixed speed, is not made smaller.
+        let bound = (value + ONE_SIDED * (high - value)).max(self.one_sided * high);
+        let sure = value + (bound - value) / self.filled;
         let margin = if self.previous == VerdictState::Safe { 1.0 } else { 1.0 - self.hysteresis };
         let (outcome, verb) = if !measured.is_valid() {
             (Outcome::Failed, "not surely under")
@@ -65,11 +78,12 @@ impl Checks {
         } else {
             (Outcome::Failed, "not surely under")
         };
-        let early = if self.filled_root < 1.0 { format!(", {sure:.3} for an early look") } else { String::new() };
+        let early = if self.filled < 1.0 { ", so early" } else { "" };
         let target =
             if margin < 1.0 { format!(" (by {:.0} % to become safe)", self.hysteresis * 100.0) } else { String::new() };
-        let text =
-            format!("{what} {value:.3} {unit} ({low:.3} to {high:.3}{early}), {verb} the limit of {limit:.3} {unit}{target}");
+        let text = format!(
+            "{what} {value:.3} {unit} ({low:.3} to {high:.3}; at most {sure:.3}{early}), {verb} the limit of {limit:.3} {unit}{target}"
+        );
         self.add(name, outcome, text);
         let under = probability_under(measured, limit);
         self.probability = Some(self.probability.map_or(under, |least| least.min(under)));
@@ -106,19 +120,14 @@ fn probability_under(measured: Estimate, limit: f64) -> f64 {
     }
     // Nothing measured but a bound: half of a normal distribution.
     if value <= 0.0 {
-        return if high > 0.0 { normal(NORMAL_95 * limit / high) } else { 1.0 };
+        return if high > 0.0 { normal_cumulative(NORMAL_95 * limit / high) } else { 1.0 };
     }
     let width = if limit >= value { (high / value).ln() } else { (value / low).ln() } / NORMAL_95;
     let distance = (limit / value).ln();
     match width {
-        w if w > 0.0 => normal(distance / w),
+        w if w > 0.0 => normal_cumulative(distance / w),
         _ => f64::from(u8::from(distance > 0.0)),
     }
-}
-
-/// The normal distribution's cumulative function.
-fn normal(z: f64) -> f64 {
-    halcyon_ocean::confidence::normal_cumulative(z)
 }
 
 #[cfg(test)]
@@ -148,20 +157,36 @@ mod tests {
 
     #[test]
     fn no_check_is_no_safety() {
-        assert_eq!(Checks::new(VerdictState::Safe, 0.1, 1.0).verdict().0, VerdictState::Inconclusive);
+        assert_eq!(Checks::new(VerdictState::Safe, 0.1, 1.0, None).verdict().0, VerdictState::Inconclusive);
     }
 
-    /// At a quarter of the window a bound is twice as far from its value.
+    /// Of 100 degrees of freedom a variance is under 1/0.7793 of its estimate with 95 % confidence, and under 1/0.7422 at the end of the two-sided
+    /// interval (Pearson & Hartley); what is added to it stays.
+    #[test]
+    fn the_upper_bound_is_one_sided() {
+        let judged = |high: f64, limit: f64| {
+            let mut checks = Checks::new(VerdictState::Safe, 0.0, 1.0, Some(100.0));
+            checks.limit("x", "x", "m", Estimate { value: 0.10, low: 0.09, high }, limit);
+            checks.verdict().0
+        };
+        let (safe, inconclusive) = (VerdictState::Safe, VerdictState::Inconclusive);
+        let (high, bound) = (0.10 / 0.742_219_f64.sqrt(), 0.10 / 0.779_295_f64.sqrt());
+        assert_eq!((judged(high, 1.003 * bound), judged(high, 0.999 * bound)), (safe, inconclusive));
+        let hidden = |limit: f64| judged(high + 0.2, limit);
+        assert_eq!((hidden(0.2 + 1.003 * bound), hidden(0.18 + bound)), (safe, inconclusive));
+    }
+
+    /// At half of the window a bound is twice as far from its value.
     #[test]
     fn early_looks_have_to_be_surer() {
         let measured = Estimate { value: 0.10, low: 0.09, high: 0.12 };
         let judged = |filled: f64| {
-            let mut checks = Checks::new(VerdictState::Safe, 0.0, filled);
+            let mut checks = Checks::new(VerdictState::Safe, 0.0, filled, None);
             checks.limit("x", "x", "m", measured, 0.13);
             checks.verdict().0
         };
         assert_eq!((judged(1.0), judged(5.0)), (VerdictState::Safe, VerdictState::Safe));
-        assert_eq!((judged(0.5), judged(0.25)), (VerdictState::Safe, VerdictState::Inconclusive));
+        assert_eq!((judged(0.7), judged(0.5)), (VerdictState::Safe, VerdictState::Inconclusive));
         assert_eq!((judged(0.0), judged(f64::NAN)), (VerdictState::Inconclusive, VerdictState::Inconclusive));
     }
 }

@@ -48,7 +48,8 @@ pub(crate) struct Judgement {
 /// Draws a verdict. `previous` is the last one, for hysteresis: bounds must be well under the limits to become safe, and reach
 /// them to stop being so; unsafe water stays so until the best estimates are under the limits.
 pub(crate) fn judge(evidence: &Evidence, config: &Config, previous: VerdictState) -> Judgement {
-    let mut checks = Checks::new(previous, config.hysteresis, evidence.observed_s / config.window_s);
+    let freedom = evidence.statistics.as_ref().map(|statistics| statistics.freedom);
+    let mut checks = Checks::new(previous, config.hysteresis, evidence.observed_s / config.window_s, freedom);
     measurement(&mut checks, evidence, config);
     match (&evidence.statistics, config.airframe.resolved()) {
         (Some(statistics), Ok(airframe)) => {
