@@ -1,5 +1,6 @@
 //! Variance density spectra of records by Welch's method, and wave statistics from spectra.
 
+use crate::dispersion::GRAVITY_MPS2;
 use realfft::RealFftPlanner;
 
 use crate::record::{Record, RecordError, mean};
@@ -182,6 +183,18 @@ impl SampledSpectrum {
     #[must_use]
     pub fn moment(&self, order: i32, low_hz: f64, high_hz: f64) -> f64 {
         self.band(low_hz, high_hz).map(|(f, density)| f.powi(order) * density * self.df_hz).sum()
+    }
+
+    /// Mean square slope along the waves over a baseline, as a finite difference measures it: ∫ S(f) (2 sin(k b/2)/b)² df with k = (2πf)²/g of deep water.
+    /// Of a short baseline it is (2π)⁴ m4/g²; waves that are shorter than twice the baseline, and their noise, count with no more than 2/b.
+    #[must_use]
+    pub fn slope_variance(&self, baseline_m: f64, low_hz: f64, high_hz: f64) -> f64 {
+        let along = |f: f64| {
+            let k_radpm = (std::f64::consts::TAU * f).powi(2) / GRAVITY_MPS2;
+            let phase = (0.5 * k_radpm * baseline_m).min(std::f64::consts::FRAC_PI_2);
+            2.0 * phase.sin() / baseline_m
+        };
+        self.band(low_hz, high_hz).map(|(f, density)| along(f).powi(2) * density * self.df_hz).sum()
     }
 
     /// Width ε = √(1 − m2²/(m0 m4)) (Cartwright and Longuet-Higgins 1956), 0 for one frequency; it hangs on the tail. NaN without energy.

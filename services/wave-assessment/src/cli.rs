@@ -10,13 +10,13 @@ mod witness;
 use std::path::{Path, PathBuf};
 
 use halcyon_ocean::Taper;
-use halcyon_ocean::quality::{Finding, Flag, Limits, RawSeries, assess};
+use halcyon_ocean::quality::{Finding, Flag, Limits, Ordered, RawSeries, assess};
 
 pub use crests::CrestReport;
-pub use report::{Band, Burst, FlagReport, Spectrum, WavesReport, ZeroCrossing};
+pub use report::{Band, Burst, FlagReport, Spectrum, Unusable, WavesReport, ZeroCrossing};
 pub use shape::{Fit, Shape, System};
 pub use survey::{ComplaintReport, DirectionReport, Heights, SeaReport, Survey, SurveyError};
-pub use verdict::{ReasonReport, VerdictReport, verdict};
+pub use verdict::{ReasonReport, VerdictReport, newest, verdict};
 pub use witness::{ComparisonReport, Witness, WitnessReport};
 
 use crate::core::quality_limits;
@@ -42,6 +42,10 @@ pub struct WavesOptions {
     pub taper: Taper,
     /// Another sensor's record of the same waves.
     pub witness: Option<Witness>,
+    /// A verdict is about so much of the end of a record, seconds, or as much as has the waves that it needs.
+    pub window_s: f64,
+    /// So many.
+    pub waves_min: u32,
 }
 
 /// Why a file has no waves to speak of.
@@ -110,13 +114,38 @@ pub fn waves(options: &WavesOptions) -> Result<WavesReport, WavesError> {
     check(options)?;
     let readings = readings(&options.input, &options.choice)?;
     let raw = RawSeries { stamp_s: &readings.stamp_s, elevation_m: &readings.elevation_m };
-    let bursts = match options.burst_s {
-        None => vec![burst(raw, options)?],
+    let (found, latest) = match options.burst_s {
+        None => {
+            let first = burst(raw, options)?;
+            let latest = latest(raw, &first, options);
+            ((first, Vec::new(), Vec::new()), latest)
+        }
         Some(burst_s) => bursts(raw, burst_s, options)?,
     };
     let witness = options.witness.as_ref().map(|witness| WitnessReport::of(raw, witness, options.band_hz)).transpose()?;
-    Ok(WavesReport::new(&readings, bursts, witness))
+    Ok(WavesReport::new(&readings, found, latest, witness))
 }
+
+/// The last part of a record that was found to be `whole`, where that is much longer than what a verdict is about.
+fn latest(raw: RawSeries<'_>, whole: &Burst, options: &WavesOptions) -> Result<Option<Burst>, String> {
+    /// Waves more than are needed: a few are lost at the ends.
+    const WAVES: f64 = 1.3;
+    /// A record that is longer by less is judged as a whole.
+    const LONGER: f64 = 1.25;
+    let Some(waves) = &whole.zero_up else { return Ok(None) };
+    let length_s = options.window_s.max(WAVES * f64::from(options.waves_min) * waves.t_z_s);
+    if whole.duration_s <= LONGER * length_s {
+        return Ok(None);
+    }
+    let last_s = raw.stamp_s.iter().copied().filter(|stamp| stamp.is_finite()).fold(f64::NEG_INFINITY, f64::max);
+    let both = raw.stamp_s.iter().zip(raw.elevation_m).filter(|(stamp_s, _)| **stamp_s > last_s - length_s);
+    let (stamp_s, elevation_m): (Vec<f64>, Vec<f64>) = both.unzip();
+    let raw = RawSeries { stamp_s: &stamp_s, elevation_m: &elevation_m };
+    analyse(raw, options.segment_s.min(0.5 * length_s), options.taper, options.band_hz).map(Some)
+}
+
+/// The first usable burst, all usable ones, those that are not, and the last part of the last one.
+type Bursts = ((Burst, Vec<Burst>, Vec<Unusable>), Result<Option<Burst>, String>);
 
 /// The readings of a file.
 fn readings(path: &Path, choice: &Choice) -> Result<Readings, WavesError> {
@@ -152,8 +181,8 @@ fn read(path: &Path) -> Result<Vec<u8>, WavesError> {
     }
 }
 
-/// Cuts a series by its stamps, from the first one on. What is left over at the end makes no burst.
-fn bursts(raw: RawSeries<'_>, burst_s: f64, options: &WavesOptions) -> Result<Vec<Burst>, WavesError> {
+/// Cuts a series by its stamps, from the first one on. What is left over at the end makes no burst. One that is unusable spoils no other.
+fn bursts(raw: RawSeries<'_>, burst_s: f64, options: &WavesOptions) -> Result<Bursts, WavesError> {
     /// A day of bursts of ten seconds.
     const BURSTS_MAX: usize = 8640;
     let finite = || raw.stamp_s.iter().copied().filter(|stamp| stamp.is_finite());
@@ -177,8 +206,24 @@ fn bursts(raw: RawSeries<'_>, burst_s: f64, options: &WavesOptions) -> Result<Ve
             elevations.push(*elevation_m);
         }
     }
-    let each = cut.iter().map(|(stamp_s, elevation_m)| burst(RawSeries { stamp_s, elevation_m }, options));
-    each.collect()
+    let (mut usable, mut unusable) = (Vec::new(), Vec::new());
+    for (i, (stamp_s, elevation_m)) in cut.iter().enumerate() {
+        let raw = RawSeries { stamp_s, elevation_m };
+        match analyse(raw, options.segment_s, options.taper, options.band_hz) {
+            Ok(burst) => usable.push(Burst { number: Some(i + 1), ..burst }),
+            Err(reason) => unusable.push(Unusable { burst: i + 1, reason }),
+        }
+    }
+    let (Some(first), Some(last)) = (usable.first().cloned(), usable.last()) else {
+        let why = unusable.first().map_or("", |one| one.reason.as_str());
+        let reason = format!("no burst of {burst_s} s is usable; the first: {why}");
+        return Err(WavesError::NoRecord { path: options.input.clone(), reason });
+    };
+    let latest = last
+        .number
+        .and_then(|number| cut.get(number - 1))
+        .map_or(Ok(None), |(stamp_s, elevation_m)| latest(RawSeries { stamp_s, elevation_m }, last, options));
+    Ok(((first, usable, unusable), latest))
 }
 
 fn burst(raw: RawSeries<'_>, options: &WavesOptions) -> Result<Burst, WavesError> {
@@ -189,8 +234,15 @@ fn burst(raw: RawSeries<'_>, options: &WavesOptions) -> Result<Burst, WavesError
 /// One record's quality and statistics; in words why there are none.
 fn analyse(raw: RawSeries<'_>, segment_s: f64, taper: Taper, band_hz: (f64, f64)) -> Result<Burst, String> {
     let assessment = assess(raw, &Limits { segment_s, ..quality_limits() });
-    let Some(even) = &assessment.even else { return Err(why_none(&assessment.findings)) };
+    let Some(even) = &assessment.even else { return Err(too_long(raw).unwrap_or_else(|| why_none(&assessment.findings))) };
     Burst::new(even, &assessment, (segment_s, taper), band_hz).map_err(|error| error.to_string())
+}
+
+/// Whether there are more readings than are analysed at once.
+fn too_long(raw: RawSeries<'_>) -> Option<String> {
+    let count = raw.stamp_s.len();
+    (count > Ordered::SAMPLES_MAX)
+        .then(|| format!("{count} readings, and {} are analysed at once: cut them with --burst", Ordered::SAMPLES_MAX))
 }
 
 /// What is wrong with readings that make no record, in words.

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 use halcyon_ocean::{Record, Taper, Welch};
 use halcyon_wave_assessment::Config;
-use halcyon_wave_assessment::cli::{WavesError, WavesOptions, WavesReport, Witness, verdict, waves};
+use halcyon_wave_assessment::cli::{WavesError, WavesOptions, WavesReport, Witness, newest, verdict, waves};
 use halcyon_wave_assessment::table::Choice;
 use tempfile::TempDir;
 
@@ -29,7 +29,7 @@ impl Files {
 fn options(input: PathBuf, rate_hz: Option<f64>) -> WavesOptions {
     let choice = Choice { rate_hz, ..Choice::default() };
     let (band_hz, taper) = ((0.05, f64::INFINITY), Taper::Hann);
-    WavesOptions { input, choice, burst_s: None, band_hz, segment_s: 64.0, taper, witness: None }
+    WavesOptions { input, choice, burst_s: None, band_hz, segment_s: 64.0, taper, witness: None, window_s: 60.0, waves_min: 20 }
 }
 
 /// A sea of eleven waves that never repeats, 4 √m0 = 0.2 m.
@@ -44,7 +44,7 @@ fn a_second_witness_must_agree() {
     let files = Files::new();
     let record = files.put("stereo.csv", table(6000, 10.0, sea_m));
     let judged = |text: String| {
-        let witness = Witness { input: files.put("probe.csv", text), choice: Choice::default(), max_lag_s: 2.0 };
+        let witness = Witness { input: files.put("probe.csv", text), choice: Choice::default(), max_lag_s: 2.0, noise_m: 0.0 };
         let report = waves(&WavesOptions { witness: Some(witness), ..options(record.clone(), None) }).unwrap();
         let mut verdict =
             verdict(&report.first, &Config { h_s_m_max: 1.0, h_tenth_m_max: 1.0, h_highest_m_max: 1.0, ..Config::default() });
@@ -57,6 +57,9 @@ fn a_second_witness_must_agree() {
     assert_eq!((same.verdict, alone, weighed.state), ("agree", "safe", "safe"), "{same:?} {weighed:?}");
     let found = same.comparison.unwrap();
     assert!((found.lag_s.unwrap() - 0.13).abs() < 0.01, "{found:?}");
+    // A copy is no witness.
+    let copy = judged(table(6000, 10.0, sea_m));
+    assert_eq!((copy.0.verdict, copy.2.state), ("unknown", "inconclusive"), "{copy:?}");
     assert!((found.slope - 1.0).abs() < 0.01 && found.r_squared > 0.99 && (found.bias_m + 0.4).abs() < 0.01, "{found:?}");
     let (higher, _, weighed) = judged(table(4200, 7.0, |t_s| 1.25 * sea_m(t_s)));
     assert_eq!((higher.verdict, weighed.state, weighed.probability), ("disagree", "inconclusive", None), "{higher:?}");
@@ -208,6 +211,118 @@ fn verdicts_follow_the_limits() {
     assert_eq!(of(&sea(0.001)), "safe");
     assert_eq!(of(&sea(0.02)), "unsafe");
     assert_eq!(of(&sea(0.15 / 17.7)), "inconclusive");
+}
+
+/// Another sea of the very same spectrum is no witness: nothing but coherence tells.
+#[test]
+fn another_sea_of_the_same_height_is_no_witness() {
+    let sea = |seed: u32| {
+        move |t_s: f64| {
+            let wave = |i: u32| {
+                let phase = TAU * (f64::from(i * 7919 + seed * 104_729).sin() * 43_758.545).fract();
+                0.005 * (TAU * (0.25 + 0.001 * f64::from(i)) * t_s + phase).sin()
+            };
+            (0..300_u32).map(wave).sum::<f64>()
+        }
+    };
+    let files = Files::new();
+    let record = files.put("stereo.csv", table(9000, 5.0, sea(1)));
+    let against = |seed| {
+        let input = files.put("probe.csv", table(9001, 5.0, sea(seed)));
+        let witness = Witness { input, choice: Choice::default(), max_lag_s: 2.0, noise_m: 0.0 };
+        let report = waves(&WavesOptions { witness: Some(witness), ..options(record.clone(), None) }).unwrap();
+        report.witness.unwrap()
+    };
+    assert_eq!(against(1).verdict, "agree");
+    for seed in 2..8 {
+        let found = against(seed);
+        assert_ne!(found.verdict, "agree", "{seed}: {found:?}");
+    }
+}
+
+/// Calm for nine minutes, then a minute of waves ten times as high: the mean of all is under the limits, and what comes next is not. The high waves
+/// are no spikes. The other way round it is calm now, though a higher wave than is allowed was seen before.
+#[test]
+fn a_verdict_is_about_the_newest_waves() {
+    let files = Files::new();
+    let grows = |t: f64| if t < 540.0 { 0.1 * sea_m(t) } else { 1.0 * sea_m(t) };
+    let growing = waves(&options(files.put("grows.csv", table(6000, 10.0, grows)), None)).unwrap();
+    let limits = Config { h_s_m_max: 0.12, ..Config::default() };
+    assert!(growing.first.spectrum.unwrap().h_m0_m < 0.1, "the mean of all is under the limit");
+    let judged = newest(&growing, &limits);
+    assert_eq!(judged.state, "unsafe", "{judged:?}");
+    assert!(judged.judged_from_s > 480.0 && judged.judged_s < 120.0, "{judged:?}");
+    let highest_m = (5400..6000).map(|i| sea_m(f64::from(i) / 10.0)).fold(f64::NEG_INFINITY, f64::max);
+    assert!((growing.first.zero_up.unwrap().crest_max_m - highest_m).abs() < 0.01, "the spike test has taken a wave away");
+    let calms = |t: f64| if t < 60.0 { 1.0 * sea_m(t) } else { 0.1 * sea_m(t) };
+    let calming = waves(&options(files.put("calms.csv", table(6000, 10.0, calms)), None)).unwrap();
+    assert_eq!(newest(&calming, &limits).state, "safe", "{:?}", newest(&calming, &limits));
+    let whole = verdict(&calming.first, &Config { h_highest_m_max: 0.2, ..limits });
+    assert!(whole.state != "safe" && whole.reasons.iter().any(|reason| reason.check == "highest_seen"), "{whole:?}");
+}
+
+/// One of three bursts is text-book noise of a dead logger; it is named, the others are analysed, and the last decides.
+#[test]
+fn a_bad_burst_spoils_no_other() {
+    let files = Files::new();
+    let text = |dead: std::ops::Range<u32>| {
+        (0..18_000_u32).fold("t,eta\n".to_owned(), |mut text, i| {
+            let t_s = f64::from(i) / 10.0;
+            let cell = if dead.contains(&i) { "NaN".to_owned() } else { format!("{:.6}", 0.1 * sea_m(t_s)) };
+            writeln!(text, "{t_s},{cell}").unwrap();
+            text
+        })
+    };
+    let report = |dead| {
+        let options = options(files.put("bursts.csv", text(dead)), None);
+        waves(&WavesOptions { burst_s: Some(600.0), ..options }).unwrap()
+    };
+    let middle = report(6000..12_000);
+    assert_eq!(middle.bursts.iter().map(|burst| burst.number).collect::<Vec<_>>(), [Some(1), Some(3)]);
+    assert_eq!(middle.unusable.iter().map(|one| one.burst).collect::<Vec<_>>(), [2]);
+    let judged = newest(&middle, &Config::default());
+    assert!(judged.state == "safe" && judged.judged_from_s > 1200.0, "{judged:?}");
+    let last = newest(&report(12_000..18_000), &Config::default());
+    assert_eq!(last.state, "inconclusive", "{last:?}");
+    assert!(last.reasons[0].text.contains("burst 3"), "{last:?}");
+}
+
+/// Two hours about a spring tide's high water: no straight line, and waves a fifth as high. They are those of the sea without the tide.
+#[test]
+fn waves_on_a_tide_are_those_without_it() {
+    let files = Files::new();
+    let tide = |t: f64| 1.5 * (TAU * (t - 3600.0) / 44_712.0).cos();
+    let still = waves(&options(files.put("still.csv", table(36_000, 5.0, sea_m)), None)).unwrap();
+    let tidal = waves(&options(files.put("tidal.csv", table(36_000, 5.0, |t| tide(t) + sea_m(t))), None)).unwrap();
+    let (without, with) = (still.first.zero_up.unwrap(), tidal.first.zero_up.unwrap());
+    assert_eq!(still.first.slow_deviation_m, None);
+    assert!(tidal.first.slow_deviation_m.unwrap() > 0.04);
+    for (found, expected) in [
+        (with.h_s_m, without.h_s_m),
+        (with.h_mean_m, without.h_mean_m),
+        (with.t_z_s, without.t_z_s),
+        (with.waves as f64, without.waves as f64),
+    ] {
+        assert!((found / expected - 1.0).abs() < 0.01, "{with:?} {without:?}");
+    }
+}
+
+/// Slope over a baseline does not hang on how fast the sensor is: a sine of amplitude a and wave number k has a mean square slope of
+/// (2 a sin(k b/2)/b)²/2.
+#[test]
+fn slope_is_that_of_the_baseline_at_any_rate() {
+    let (amplitude_m, f_hz, baseline_m) = (0.05, 0.5, 0.4);
+    let k_radpm = (TAU * f_hz).powi(2) / 9.806_65;
+    let expected = (2.0 * amplitude_m * (0.5 * k_radpm * baseline_m).sin() / baseline_m).powi(2) / 2.0;
+    for rate_hz in [4.0, 10.0, 50.0] {
+        let noise = |i: usize| 0.001 * ((i as f64 * 12.9898).sin() * 43_758.545).fract();
+        let samples_m: Vec<f64> =
+            (0..(600.0 * rate_hz) as usize).map(|i| amplitude_m * (TAU * f_hz * i as f64 / rate_hz).sin() + noise(i)).collect();
+        let record = Record::new(samples_m, rate_hz).unwrap();
+        let spectrum = Welch::with_segments_of_s(64.0, &record).spectrum(&record).unwrap();
+        let found = spectrum.slope_variance(baseline_m, 0.05, f64::INFINITY);
+        assert!((found / expected - 1.0).abs() < 0.02, "{rate_hz} Hz: {found} {expected}");
+    }
 }
 
 /// OCEANLYZ's sample record with its published table, where its folder is: `HALCYON_OCEANLYZ`, or `../shared/data/oceanlyz` beside the project.

@@ -91,6 +91,9 @@ pub(super) struct WitnessArgs {
     /// Its clock may be off by so much, seconds
     #[arg(long, value_name = "S", default_value_t = 2.0, requires = "witness", allow_negative_numbers = true)]
     witness_lag: f64,
+    /// Noise of its readings, metres, one standard deviation: a resolution of 1 cm is 0.003
+    #[arg(long, value_name = "M", default_value_t = 0.0, requires = "witness", allow_negative_numbers = true)]
+    witness_noise: f64,
 }
 
 impl WitnessArgs {
@@ -109,6 +112,7 @@ impl WitnessArgs {
                 unit: None,
             },
             max_lag_s: self.witness_lag,
+            noise_m: self.witness_noise,
         })
     }
 }
@@ -155,11 +159,11 @@ impl Window {
 }
 
 fn length_unit(text: &str) -> Result<LengthUnit, String> {
-    LengthUnit::ALL.iter().copied().find(|unit| unit.as_str() == text).ok_or_else(|| "use m, cm, mm or ft".into())
+    LengthUnit::named(text).ok_or_else(|| format!("use one of {}", LengthUnit::NAMES.join(", ")))
 }
 
 fn time_unit(text: &str) -> Result<TimeUnit, String> {
-    TimeUnit::ALL.iter().copied().find(|unit| unit.as_str() == text).ok_or_else(|| "use s, ms, us, ns, min, h or d".into())
+    TimeUnit::named(text).ok_or_else(|| format!("use one of {}", TimeUnit::NAMES.join(", ")))
 }
 
 pub(super) fn run(options: &Options, args: &Args) -> anyhow::Result<ExitCode> {
@@ -185,21 +189,24 @@ pub(super) fn run(options: &Options, args: &Args) -> anyhow::Result<ExitCode> {
         segment_s: args.segment,
         taper: args.window.taper(),
         witness: args.witness.witness(),
+        window_s: config.window_s,
+        waves_min: config.waves_min,
     };
     let report = cli::waves(&options).map_err(bad_input)?;
     if let Some(path) = &args.plot {
         let drawn = if has_ending(path, &["svg"]) { spectrum(&report.first)?.svg()? } else { page(&report, &options)?.html() };
         write_bytes(path, drawn.as_bytes()).map_err(bad_input)?;
     }
-    let mut verdict = cli::verdict(&report.first, &config);
+    let mut verdict = cli::newest(&report, &config);
     if let Some(witness) = &report.witness {
         witness.weigh(&mut verdict);
     }
+    let states: Vec<BurstVerdict> = report.bursts.iter().map(|burst| BurstVerdict::of(burst, &config)).collect();
     if args.json {
-        output::json(&Judged { report: &report, verdict: &verdict })?;
+        output::json(&Judged { report: &report, burst_verdicts: &states, verdict: &verdict })?;
         return Ok(ExitCode::SUCCESS);
     }
-    print(&report, &verdict)?;
+    print(&report, &states, &verdict)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -213,11 +220,27 @@ pub(super) fn four(value: f64) -> String {
 struct Judged<'a> {
     #[serde(flatten)]
     report: &'a WavesReport,
-    /// On the whole record, or the first burst of several.
+    /// Of each burst by itself.
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    burst_verdicts: &'a [BurstVerdict],
+    /// On the newest waves: the last part of the record, or of its last burst.
     verdict: &'a VerdictReport,
 }
 
-fn print(report: &WavesReport, verdict: &VerdictReport) -> anyhow::Result<()> {
+/// What is said of one burst.
+#[derive(Debug, Serialize)]
+struct BurstVerdict {
+    burst: usize,
+    state: &'static str,
+}
+
+impl BurstVerdict {
+    fn of(burst: &Burst, config: &Config) -> Self {
+        Self { burst: burst.number.unwrap_or(0), state: cli::verdict(burst, config).state }
+    }
+}
+
+fn print(report: &WavesReport, states: &[BurstVerdict], verdict: &VerdictReport) -> anyhow::Result<()> {
     let stamps = report.time_column.as_ref().map_or_else(|| "stated rate".to_owned(), |name| format!("{name:?}"));
     output::line(&format!("elevation {:?} ({}), stamps: {stamps}", report.value_column, report.unit))?;
     for (name, row) in report.witness.iter().flat_map(witness_rows) {
@@ -225,20 +248,16 @@ fn print(report: &WavesReport, verdict: &VerdictReport) -> anyhow::Result<()> {
     }
     if report.bursts.is_empty() {
         print_burst(&report.first)?;
-        output::line(&format!("verdict: {}", verdict.state))?;
-        for reason in &verdict.reasons {
-            output::line(&format!("  {} {}", if reason.passed { "+" } else { "-" }, reason.text))?;
-        }
-        return Ok(());
+        return print_verdict(verdict);
     }
-    output::line("burst  H_m0 m   T_p s    f_p Hz   H_s m    H_m m    T_z s    T_1/3 s  waves  quality")?;
-    for (i, burst) in report.bursts.iter().enumerate() {
+    output::line("burst  H_m0 m   T_p s    f_p Hz   H_s m    H_m m    T_z s    T_1/3 s  waves  verdict       quality")?;
+    for (burst, state) in report.bursts.iter().zip(states) {
         let cell = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), four);
         let up = |pick: fn(&ZeroCrossing) -> f64| cell(burst.zero_up.as_ref().map(pick));
         let spectrum = burst.spectrum.as_ref();
         output::line(&format!(
-            "{:<6} {:<8} {:<8} {:<8} {:<8} {:<8} {:<8} {:<8} {:<6} {}",
-            i + 1,
+            "{:<6} {:<8} {:<8} {:<8} {:<8} {:<8} {:<8} {:<8} {:<6} {:<13} {}",
+            state.burst,
             cell(spectrum.map(|s| s.h_m0_m)),
             cell(spectrum.map(|s| s.t_p_s)),
             cell(spectrum.map(|s| s.f_p_hz)),
@@ -247,8 +266,20 @@ fn print(report: &WavesReport, verdict: &VerdictReport) -> anyhow::Result<()> {
             up(|z| z.t_z_s),
             up(|z| z.t_third_s),
             burst.zero_up.map_or(0, |z| z.waves),
+            state.state,
             complaints(burst).join(", ")
         ))?;
+    }
+    for one in &report.unusable {
+        output::line(&format!("burst {} is unusable: {}", one.burst, one.reason))?;
+    }
+    print_verdict(verdict)
+}
+
+fn print_verdict(verdict: &VerdictReport) -> anyhow::Result<()> {
+    output::line(&format!("verdict on the last {:.1} s: {}", verdict.judged_s, verdict.state))?;
+    for reason in &verdict.reasons {
+        output::line(&format!("  {} {}", if reason.passed { "+" } else { "-" }, reason.text))?;
     }
     Ok(())
 }
@@ -268,6 +299,9 @@ fn print_burst(burst: &Burst) -> anyhow::Result<()> {
         four(burst.mean_m),
         four(burst.deviation_m)
     ))?;
+    if let Some(slow_m) = burst.slow_deviation_m {
+        output::line(&format!("slower than the waves, and taken off: {} m (tide, seiche or drift)", four(slow_m)))?;
+    }
     for (name, row) in rows(burst) {
         output::line(&format!("{name:<36} {row}"))?;
     }

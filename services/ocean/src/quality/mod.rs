@@ -26,7 +26,7 @@ pub mod series;
 pub mod spectral;
 
 pub use assess::{Assessment, Limits, assess};
-pub use series::{Even, RawSeries};
+pub use series::{Even, Ordered, RawSeries};
 
 /// What a test says: QARTOD's primary flags, with the numbers that data centres store.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -16,7 +16,7 @@ pub struct ReadingLimits {
     pub gap_suspect_samples: usize,
     /// This many fail, and the record is cut there. 8.
     pub gap_fail_samples: usize,
-    /// What the instrument can give, metres; what is outside fails and is rejected. −20 to 20 m.
+    /// What the instrument can give about the median, metres; what is outside fails and is rejected. −20 to 20 m.
     pub instrument_m: RangeInclusive<f64>,
     /// What the place can give about the median, metres; outside is suspect, and kept. −5 to 5 m.
     pub local_m: RangeInclusive<f64>,
@@ -139,10 +139,14 @@ pub fn range(series: &mut Ordered, limits: &ReadingLimits) -> Finding {
         let of = |(place, reading): (usize, &Reading)| (reading.is_good() && !inside(reading.elevation_m)).then_some(place);
         series.readings.iter().enumerate().filter_map(of).collect()
     }
-    let impossible = outside(series, |x| limits.instrument_m.contains(&x));
+    let impossible = outside(series, |x| limits.instrument_m.contains(&(x - median_m)));
     let rejected = reject(series, &impossible);
     if !rejected.is_empty() {
-        let reason = format!("{} readings outside {:?} m, what the instrument can give", rejected.len(), limits.instrument_m);
+        let reason = format!(
+            "{} readings outside {:?} m about the median of {median_m:.3} m, what the instrument can give",
+            rejected.len(),
+            limits.instrument_m
+        );
         return Finding::new(Test::Range, Flag::Fail, reason).about(rejected);
     }
     let unlikely = outside(series, |x| limits.local_m.contains(&(x - median_m)));
@@ -152,7 +156,22 @@ pub fn range(series: &mut Ordered, limits: &ReadingLimits) -> Finding {
     Finding::new(Test::Range, flag, reason).about(indices)
 }
 
-/// Test 10: readings far from the mean, alone or a few in a row, are rejected. Names them, and those of longer runs, which stay.
+/// Whether a run of readings, far from the mean by `deviation_m`, is the top of a wave: the readings beside it are on their way there. The highest
+/// waves of a growing sea are far from the mean of all of it, and no spikes.
+fn is_crest(readings: &[Reading], run: &[usize], deviation_m: impl Fn(&Reading) -> f64) -> bool {
+    /// Of a wave with eight readings, or more, those beside its highest two have at least this share of its height.
+    const BESIDE_MIN: f64 = 0.3;
+    let (Some(first), Some(last)) = (run.first(), run.last()) else { return false };
+    let beside = [first.checked_sub(1), Some(last + 1)];
+    let highest_m =
+        run.iter().map(|place| deviation_m(&readings[*place])).fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
+    beside.iter().all(|place| {
+        let reading = place.and_then(|place| readings.get(place)).filter(|reading| reading.is_good());
+        reading.is_some_and(|reading| deviation_m(reading) / highest_m >= BESIDE_MIN)
+    })
+}
+
+/// Test 10: readings far from the mean, alone or a few in a row, are rejected, unless they are the top of a wave. Names them, and those that stay.
 pub fn spike(series: &mut Ordered, limits: &ReadingLimits) -> Finding {
     let (_, _, count) = moments(series);
     if count == 0 {
@@ -164,7 +183,7 @@ pub fn spike(series: &mut Ordered, limits: &ReadingLimits) -> Finding {
         return Finding::new(Test::Spike, Flag::NotEvaluated, reason);
     }
     let mut rejected = Vec::new();
-    let mut runs_too_long = Vec::new();
+    let mut kept = Vec::new();
     for _ in 0..limits.spike_passes.max(1) {
         let (mean_m, sigma_m, _) = moments(series);
         // Rounding alone makes the deviation of a constant differ from zero.
@@ -173,10 +192,12 @@ pub fn spike(series: &mut Ordered, limits: &ReadingLimits) -> Finding {
         };
         let outside: Vec<usize> =
             (0..series.readings.len()).filter(|i| series.readings[*i].is_good() && far(&series.readings[*i])).collect();
-        runs_too_long.clear();
+        kept.clear();
         let mut short = Vec::new();
         for run in outside.chunk_by(|a, b| a + 1 == *b) {
-            if run.len() <= limits.spike_run_samples_max { &mut short } else { &mut runs_too_long }.extend_from_slice(run);
+            let is_spike =
+                run.len() <= limits.spike_run_samples_max && !is_crest(&series.readings, run, |r| r.elevation_m - mean_m);
+            if is_spike { &mut short } else { &mut kept }.extend_from_slice(run);
         }
         if short.is_empty() {
             break;
@@ -184,18 +205,18 @@ pub fn spike(series: &mut Ordered, limits: &ReadingLimits) -> Finding {
         rejected.extend(reject(series, &short));
     }
     let share = rejected.len() as f64 / count as f64;
-    let flag = match rejected.len() + runs_too_long.len() {
+    let flag = match rejected.len() + kept.len() {
         0 => Flag::Pass,
         _ if share >= limits.rejected_fail_share => Flag::Fail,
         _ => Flag::Suspect,
     };
     let reason = format!(
-        "{} spikes beyond {} deviations rejected, {} such readings in longer runs kept",
+        "{} spikes beyond {} deviations rejected, {} such readings in longer runs or at the top of waves kept",
         rejected.len(),
         limits.spike_sigmas,
-        runs_too_long.len()
+        kept.len()
     );
-    rejected.extend(runs_too_long.iter().map(|place| series.readings[*place].index));
+    rejected.extend(kept.iter().map(|place| series.readings[*place].index));
     Finding::new(Test::Spike, flag, reason).about(rejected)
 }
 

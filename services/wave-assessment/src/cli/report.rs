@@ -1,6 +1,7 @@
 //! What `halcyon waves` prints: numbers with their units in their names, and 95 % intervals as `x_low` and `x_high`.
 
 use halcyon_ocean::crossing::{Crossing, Wave, WaveStatistics, waves};
+use halcyon_ocean::filter::band_pass;
 use halcyon_ocean::interval::{Interval, SpectralIntervals, WaveIntervals};
 use halcyon_ocean::quality::{Assessment, Even, Finding};
 use halcyon_ocean::record::RecordError;
@@ -28,20 +29,42 @@ pub struct WavesReport {
     /// Every burst, where the record was cut.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub bursts: Vec<Burst>,
+    /// Bursts that hold no waves to speak of.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub unusable: Vec<Unusable>,
+    /// The last part of the record or of its last burst, which is what a verdict is about; `None` where that is all of it, and in words what is
+    /// wrong with it.
+    #[serde(skip)]
+    pub latest: Result<Option<Burst>, String>,
     /// What a second witness says of the whole record, where there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub witness: Option<WitnessReport>,
 }
 
+/// A burst without waves to speak of.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Unusable {
+    /// Its number, from 1.
+    pub burst: usize,
+    /// Why.
+    pub reason: String,
+}
+
 impl WavesReport {
-    pub(super) fn new(readings: &Readings, mut bursts: Vec<Burst>, witness: Option<WitnessReport>) -> Self {
-        let first = if bursts.len() == 1 { bursts.remove(0) } else { bursts[0].clone() };
+    pub(super) fn new(
+        readings: &Readings,
+        (first, bursts, unusable): (Burst, Vec<Burst>, Vec<Unusable>),
+        latest: Result<Option<Burst>, String>,
+        witness: Option<WitnessReport>,
+    ) -> Self {
         Self {
             time_column: readings.time_column.clone(),
             value_column: readings.value_column.clone(),
             unit: readings.unit.as_str(),
             first,
             bursts,
+            unusable,
+            latest,
             witness,
         }
     }
@@ -50,6 +73,9 @@ impl WavesReport {
 /// One record that is analysed by itself.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Burst {
+    /// Its number, from 1, where the record was cut.
+    #[serde(rename = "burst", skip_serializing_if = "Option::is_none")]
+    pub number: Option<usize>,
     /// Samples of the even record.
     pub samples: usize,
     /// Of these, how many were filled in.
@@ -64,6 +90,10 @@ pub struct Burst {
     pub mean_m: f64,
     /// Standard deviation about the trend, metres.
     pub deviation_m: f64,
+    /// Standard deviation of what is slower than the waves' band, metres, where it was taken off: tide, seiche, a drifting sensor. Waves that ride
+    /// on it would cross no mean level; absent where it is next to nothing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub slow_deviation_m: Option<f64>,
     /// Skewness of the elevation; null where it is flat.
     pub skewness: f64,
     /// Its kurtosis, 3 for a Gaussian sea.
@@ -254,7 +284,7 @@ impl Burst {
         band_hz: (f64, f64),
     ) -> Result<Self, RecordError> {
         let mean_m = even.record.mean_m();
-        let record = even.record.clone().without_trend();
+        let (record, slow_deviation_m) = without_tide(even.record.clone().without_trend(), band_hz.0)?;
         let up = waves(&record, Crossing::Up, 0.0);
         let welch = Welch { taper, ..Welch::with_segments_of_s(segment_s, &record) };
         let density = welch.spectrum(&record)?;
@@ -262,6 +292,7 @@ impl Burst {
         let spectrum = Spectrum::of(&record, &density, band_hz);
         let crest_statistics = spectrum.as_ref().map_or_else(Vec::new, |spectrum| crests(&up, spectrum, &density));
         Ok(Self {
+            number: None,
             samples: record.samples_m().len(),
             filled: even.filled.iter().filter(|filled| **filled).count(),
             rate_hz: record.rate_hz(),
@@ -269,6 +300,7 @@ impl Burst {
             duration_s: record.duration_s(),
             mean_m,
             deviation_m: record.variance_m2().sqrt(),
+            slow_deviation_m,
             skewness: record.skewness(),
             kurtosis: record.kurtosis(),
             zero_up: ZeroCrossing::of(&up),
@@ -282,4 +314,17 @@ impl Burst {
             elevation_m: record.samples_m().to_vec(),
         })
     }
+}
+
+/// A record without what is slower than `low_hz`, and that part's standard deviation, metres; as it is where that is little beside the waves.
+fn without_tide(record: Record, low_hz: f64) -> Result<(Record, Option<f64>), RecordError> {
+    /// Of the waves' variance: heights then are wrong by a fortieth at most.
+    const LITTLE: f64 = 0.05;
+    let slow_m = band_pass(&record, 0.0, low_hz);
+    let mean_square = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>() / x.len() as f64;
+    let rest_m: Vec<f64> = record.samples_m().iter().zip(&slow_m).map(|(all, slow)| all - slow).collect();
+    if low_hz <= 0.0 || mean_square(&slow_m) <= LITTLE * mean_square(&rest_m) {
+        return Ok((record, None));
+    }
+    Ok((Record::new(rest_m, record.rate_hz())?, Some(mean_square(&slow_m).sqrt())))
 }

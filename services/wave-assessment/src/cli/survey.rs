@@ -203,6 +203,8 @@ impl Survey {
             state: sea.verdict.state.as_str(),
             probability: sea.verdict.probability,
             reasons: reasons.collect(),
+            judged_from_s: seconds(sea.window_start),
+            judged_s: sea.window_s,
             valid_until: seconds(sea.verdict.valid_until),
         };
         if let Some(witness) = &witness {

@@ -1,10 +1,10 @@
 //! A verdict on a record of one gauge, by the limits that patches are judged by.
 
 use halcyon_model::{Estimate, VerdictState};
-use halcyon_ocean::dispersion::GRAVITY_MPS2;
+use halcyon_ocean::height::H_TENTH_OVER_ROOT_M0;
 use serde::Serialize;
 
-use super::Burst;
+use super::{Band, Burst, WavesReport};
 use crate::config::Config;
 use crate::core::{Evidence, Judgement, Statistics, judge};
 
@@ -17,6 +17,10 @@ pub struct VerdictReport {
     pub probability: Option<f64>,
     /// Every check in words, those that failed first.
     pub reasons: Vec<ReasonReport>,
+    /// Stamp from which on the record was judged, seconds: of a long record the last part is, as it is in flight.
+    pub judged_from_s: f64,
+    /// For so long, seconds.
+    pub judged_s: f64,
     /// Seconds of the record's stamps after which it means nothing.
     pub valid_until: f64,
 }
@@ -35,8 +39,31 @@ pub struct ReasonReport {
 /// Checks that make sense of patches only.
 const OF_PATCHES: [&str; 3] = ["coverage", "repeated", "long_waves"];
 
-/// Judges a record. Slope is that of waves in deep water by the spectrum, (2π)⁴ m4 / g² (Cox and Munk 1954 have it so): noise raises it, which
-/// is on the safe side. A record with a failed quality test is judged by nothing.
+/// Judges a file by its newest waves: the last part of the record, or of the last burst. Who lands, lands on what comes next, and an hour's mean may
+/// be that of a calm before it. A burst or part that is unusable is judged by nothing.
+#[must_use]
+pub fn newest(report: &WavesReport, config: &Config) -> VerdictReport {
+    let last = report.bursts.last().unwrap_or(&report.first);
+    let unusable = match (&report.latest, report.unusable.last()) {
+        (_, Some(one)) if last.number.is_none_or(|number| one.burst > number) => {
+            Some(format!("burst {}, the last one, is unusable: {}", one.burst, one.reason))
+        }
+        (Err(reason), _) => Some(format!("the last part of the record is unusable: {reason}")),
+        _ => None,
+    };
+    let latest = report.latest.as_ref().ok().and_then(Option::as_ref);
+    let mut judged = verdict(latest.unwrap_or(last), config);
+    if let Some(text) = unusable {
+        judged.state = VerdictState::Inconclusive.as_str();
+        judged.probability = None;
+        judged.reasons.insert(0, ReasonReport { check: "usable".into(), passed: false, text });
+    }
+    judged
+}
+
+/// Judges a record as a whole. Slope is that of waves in deep water by the spectrum (Cox and Munk 1954 have it so) over the baseline that patches
+/// are measured with: noise raises it, which is on the safe side. A record with a failed quality test is judged by nothing, and one with a wave over
+/// the limit of the highest is not safe.
 #[must_use]
 pub fn verdict(burst: &Burst, config: &Config) -> VerdictReport {
     let evidence = Evidence {
@@ -49,7 +76,7 @@ pub fn verdict(burst: &Burst, config: &Config) -> VerdictReport {
         hidden_m: Some(0.0),
         // They come with the burst, and their words go first below.
         quality: Vec::new(),
-        statistics: statistics(burst),
+        statistics: statistics(burst, config.slope_baseline_m),
         witness: None,
     };
     let Judgement { mut state, reasons, mut probability } = judge(&evidence, config, VerdictState::Inconclusive);
@@ -62,13 +89,24 @@ pub fn verdict(burst: &Burst, config: &Config) -> VerdictReport {
         state = VerdictState::Inconclusive;
         probability = None;
     }
+    let highest_m = burst.zero_up.iter().chain(&burst.zero_down).map(|waves| waves.h_max_m).fold(0.0, f64::max);
+    let limit_m = config.h_highest_m_max;
+    if highest_m > limit_m {
+        let text = format!("a wave of {highest_m:.3} m was seen, over the limit of {limit_m:.3} m for the highest");
+        reasons.push(ReasonReport { check: "highest_seen".into(), passed: false, text });
+        if state == VerdictState::Safe {
+            state = VerdictState::Unsafe;
+        }
+        probability = probability.map(|probability| probability.min(0.5));
+    }
     reasons.extend(checks);
     let valid_until = burst.start_s + burst.duration_s + config.validity_s;
-    VerdictReport { state: state.as_str(), probability, reasons, valid_until }
+    let (judged_from_s, judged_s) = (burst.start_s, burst.duration_s);
+    VerdictReport { state: state.as_str(), probability, reasons, judged_from_s, judged_s, valid_until }
 }
 
 /// `None` without waves.
-fn statistics(burst: &Burst) -> Option<Statistics> {
+fn statistics(burst: &Burst, baseline_m: f64) -> Option<Statistics> {
     let (up, spectrum) = (burst.zero_up.as_ref()?, burst.spectrum.as_ref()?);
     // Without bounds nothing is known: NaN passes no check.
     let estimate = |value: f64, low: Option<f64>, high: Option<f64>| Estimate {
@@ -76,8 +114,12 @@ fn statistics(burst: &Burst) -> Option<Statistics> {
         low: low.unwrap_or(f64::NAN),
         high: high.unwrap_or(f64::NAN),
     };
-    let slope = (std::f64::consts::TAU.powi(4) * spectrum.m4).sqrt() / GRAVITY_MPS2;
+    let Band { low_hz, high_hz } = spectrum.band;
+    let slope = burst.density.as_ref()?.slope_variance(baseline_m, low_hz, high_hz).sqrt();
     let h_m0_m = estimate(spectrum.h_m0_m, spectrum.h_m0_m_low, spectrum.h_m0_m_high);
+    // A bootstrap of few waves does not know what waves it has not seen: the spectrum's bound, by Longuet-Higgins's (1952) ratio, does.
+    let by_spectrum = h_m0_m.high * H_TENTH_OVER_ROOT_M0 / 4.0;
+    let h_tenth_high = up.h_tenth_m_high.map(|high| high.max(by_spectrum));
     // A slope is a root of a variance, and steep waves are short: it is known at least as well as a height.
     let share = |bound: f64| bound / h_m0_m.value * slope;
     Some(Statistics {
@@ -89,7 +131,7 @@ fn statistics(burst: &Burst) -> Option<Statistics> {
         h_max_m: Estimate { value: up.h_max_m, low: up.h_max_m, high: up.h_max_m },
         h_m0_m,
         h_rms_m: estimate(up.h_rms_m, up.h_rms_m_low, up.h_rms_m_high),
-        h_tenth_m: estimate(up.h_tenth_m, up.h_tenth_m_low, up.h_tenth_m_high),
+        h_tenth_m: estimate(up.h_tenth_m, up.h_tenth_m_low, h_tenth_high),
         freedom: 1.0,
         spectral: None,
         t_z_s: Some(estimate(up.t_z_s, up.t_z_s_low, up.t_z_s_high)),

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use halcyon_ocean::interval::Interval;
 use halcyon_ocean::quality::RawSeries;
-use halcyon_ocean::witness::{Difference, Ignorance, Options, Verdict, agreement, compare};
+use halcyon_ocean::witness::{Comparison, Difference, Ignorance, Options, Verdict, agreement, compare};
 use serde::Serialize;
 
 use super::verdict::{ReasonReport, VerdictReport};
@@ -20,6 +20,8 @@ pub struct Witness {
     pub choice: Choice,
     /// Its clock may be off by so much either way, seconds.
     pub max_lag_s: f64,
+    /// Standard deviation of a reading's noise, metres; a resolution of r is r/√12.
+    pub noise_m: f64,
 }
 
 /// What a witness says of a record, as `--json` prints it.
@@ -82,15 +84,27 @@ impl WitnessReport {
             let must = "from 0 to 3600 s".into();
             return Err(WavesError::Option { option: "--witness-lag", must, value: witness.max_lag_s });
         }
+        if !(0.0..=1.0).contains(&witness.noise_m) {
+            let must = "from 0 to 1 m".into();
+            return Err(WavesError::Option { option: "--witness-noise", must, value: witness.noise_m });
+        }
         let other = readings(&witness.input, &witness.choice)?;
+        let same = |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits());
+        if same(record.elevation_m, &other.elevation_m) {
+            let why = vec!["it holds the very readings that it should confirm".into()];
+            return Ok(Self { verdict: "unknown", why, comparison: None });
+        }
         let other = RawSeries { stamp_s: &other.stamp_s, elevation_m: &other.elevation_m };
-        let options = Options { max_lag_s: witness.max_lag_s, band_hz, ..Options::default() };
+        let options = Options { max_lag_s: witness.max_lag_s, noise_b_m: witness.noise_m, band_hz, ..Options::default() };
         let compared = match compare(&record, &other, &options) {
             Ok(compared) => compared,
             Err(error) => return Ok(Self { verdict: "unknown", why: vec![error.to_string()], comparison: None }),
         };
         let (verdict, why) = match agreement(&compared) {
-            Verdict::Agree => ("agree", Vec::new()),
+            Verdict::Agree => match unrelated(&compared) {
+                Some(why) => ("unknown", vec![why]),
+                None => ("agree", Vec::new()),
+            },
             Verdict::Disagree { why } => ("disagree", why.iter().map(Difference::to_string).collect()),
             Verdict::Unknown { why } => ("unknown", why.iter().map(ignorance).collect()),
         };
@@ -135,6 +149,22 @@ impl WitnessReport {
         verdict.probability = None;
         verdict.state = "inconclusive";
     }
+}
+
+/// Whether two records that should be of the same waves have nothing in common but heights and periods, in words: any sea of that height would do.
+fn unrelated(compared: &Comparison) -> Option<String> {
+    /// Coherence that unrelated records exceed no more often than this is no chance. The best of all lags was taken, which makes more of chance than
+    /// one look does.
+    const CHANCE: f64 = 0.001;
+    let peak = compared.at_peak?;
+    let by_chance = 1.0 - CHANCE.powf(1.0 / (peak.averages - 1.0).max(f64::MIN_POSITIVE));
+    (peak.coherence <= by_chance).then(|| {
+        format!(
+            "heights and periods agree, the waves do not (coherence of {:.2} about the peak, and {by_chance:.2} come by chance): another place or time, \
+             or a clock that is off by more than the lag allowed",
+            peak.coherence
+        )
+    })
 }
 
 fn ignorance(ignorance: &Ignorance) -> String {

@@ -4,6 +4,8 @@ use jiff::Timestamp;
 use jiff::civil::DateTime;
 use jiff::tz::TimeZone;
 
+use super::units::{is_unit, with_unit};
+
 /// Lines that are looked at to find out how a table is written.
 const SAMPLE_LINES: usize = 200;
 /// Lines of words before the data; a text of more is no table.
@@ -110,12 +112,17 @@ fn unquoted(cell: &str) -> &str {
     cell.strip_prefix('"').and_then(|cell| cell.strip_suffix('"')).unwrap_or(cell).trim()
 }
 
-/// Lines that hold something, with their numbers from 1.
+/// Lines that are no comments.
 fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    every_line(text).filter(|(_, line)| !line.trim_start().starts_with(['#', '%']))
+}
+
+/// Lines that hold something, with their numbers from 1.
+fn every_line(text: &str) -> impl Iterator<Item = (usize, &str)> {
     // Old Macintosh files end lines with a carriage return alone.
     let ends: &[char] = if text.contains('\n') { &['\n'] } else { &['\n', '\r'] };
     let numbered = text.split(ends).enumerate().map(|(i, line)| (i + 1, line.trim_end_matches('\r')));
-    numbered.filter(|(_, line)| !line.trim().is_empty() && !line.trim_start().starts_with(['#', '%']))
+    numbered.filter(|(_, line)| !line.trim().is_empty())
 }
 
 /// What a cell says.
@@ -168,7 +175,14 @@ impl Table {
         let Some(style) = how_written(text) else { return Err(TableError::Empty) };
         let mut header: Vec<Vec<&str>> = Vec::new();
         let mut table: Option<Self> = None;
-        for (number, line) in lines(text) {
+        for (number, line) in every_line(text) {
+            if let Some(comment) = line.trim_start().strip_prefix(['#', '%']) {
+                // Names and units may stand in a comment above the data.
+                if table.is_none() && header.len() < HEADER_LINES_MAX {
+                    header.push(style.cut(comment.trim_start_matches(['#', '%'])));
+                }
+                continue;
+            }
             let cells = style.cut(line);
             let Some(table) = &mut table else {
                 let read = style.read(line);
@@ -212,12 +226,18 @@ impl Table {
 
     fn begin(header: &[Vec<&str>], first: &[Cell]) -> Self {
         // The nearest line with a name for each column: above it are titles, below it may be units.
-        let fits = |names: &&Vec<&str>| names.len() == first.len();
-        let words = |names: &&Vec<&str>| names.iter().all(|name| name.chars().any(char::is_alphabetic));
-        let names = header.iter().filter(fits).find(words).or_else(|| header.iter().rev().find(fits));
-        let name = |i: usize| match names.and_then(|names| names.get(i)) {
-            Some(name) if !name.is_empty() => (*name).to_owned(),
-            _ => format!("column {}", i + 1),
+        let mut fitting: Vec<&Vec<&str>> = header.iter().filter(|names| names.len() == first.len()).collect();
+        let is_units = |line: &&&Vec<&str>| line.iter().all(|cell| is_unit(cell)) && line.iter().any(|cell| !cell.is_empty());
+        let units = fitting.last().filter(is_units).copied();
+        fitting.truncate(fitting.len() - usize::from(units.is_some()));
+        let words = |names: &&&Vec<&str>| names.iter().all(|name| name.chars().any(char::is_alphabetic));
+        let names = fitting.iter().rev().find(words).or(fitting.last());
+        let name = |i: usize| {
+            let name = match names.and_then(|names| names.get(i)) {
+                Some(name) if !name.is_empty() => (*name).to_owned(),
+                _ => format!("column {}", i + 1),
+            };
+            units.and_then(|units| units.get(i)).map_or(name.clone(), |unit| with_unit(&name, unit))
         };
         let value = |cell: &Cell| match cell {
             Cell::Number(value) | Cell::Date(value) => *value,

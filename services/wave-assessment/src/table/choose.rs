@@ -1,6 +1,7 @@
 //! Which columns are time and elevation, and in which units.
 
 use super::cells::Table;
+use super::units::{LengthUnit, Stated, TimeUnit};
 
 /// Stamps that are this far from evenly spaced, as a share of their interval, contradict a stated rate.
 const RATE_DISAGREEMENT_MAX: f64 = 0.05;
@@ -78,6 +79,22 @@ pub enum ChoiceError {
         /// As stated.
         rate_hz: f64,
     },
+    /// The column says that it is no length.
+    #[error("column {name:?} is in {unit:?}, which is no unit of length known here: say --unit, or --value-column")]
+    NoLength {
+        /// The column.
+        name: String,
+        /// What it says.
+        unit: String,
+    },
+    /// The column says that it is no time.
+    #[error("column {name:?} is in {unit:?}, which is no unit of time known here: say --time-unit, or --time-column")]
+    NoTimeUnit {
+        /// The column.
+        name: String,
+        /// What it says.
+        unit: String,
+    },
     /// Not a single reading.
     #[error("column {name:?} holds no reading")]
     AllMissing {
@@ -91,74 +108,6 @@ fn list(names: &[String]) -> String {
     let shown: Vec<String> = names.iter().take(SHOWN).map(|name| format!("{name:?}")).collect();
     let more = names.len().saturating_sub(SHOWN);
     if more > 0 { format!("{} and {more} more", shown.join(", ")) } else { shown.join(", ") }
-}
-
-/// Declares a unit: its variants, names and factors.
-macro_rules! unit {
-    ($(#[$doc:meta])* $name:ident { $($(#[$variant_doc:meta])* $variant:ident = $text:literal, $factor:expr;)* }) => {
-        $(#[$doc])*
-        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-        pub enum $name { $($(#[$variant_doc])* $variant,)* }
-
-        impl $name {
-            /// All of them.
-            pub const ALL: &'static [Self] = &[$(Self::$variant,)*];
-
-            /// As it is written.
-            #[must_use]
-            pub fn as_str(self) -> &'static str {
-                match self { $(Self::$variant => $text,)* }
-            }
-
-            /// In SI.
-            #[must_use]
-            pub fn factor(self) -> f64 {
-                match self { $(Self::$variant => $factor,)* }
-            }
-
-            /// The unit that a column's name ends in: `eta_mm`, `eta [mm]`, `eta (mm)`.
-            fn of_name(name: &str) -> Option<Self> {
-                let name = name.trim().trim_end_matches([']', ')']);
-                let (rest, unit) = name.rsplit_once(['_', '[', '(', ' '])?;
-                if rest.is_empty() { return None; }
-                Self::ALL.iter().copied().find(|candidate| candidate.as_str() == unit.trim())
-            }
-        }
-    };
-}
-
-unit! {
-    /// A unit of time.
-    TimeUnit {
-        /// Nanoseconds.
-        Nanoseconds = "ns", 1e-9;
-        /// Microseconds.
-        Microseconds = "us", 1e-6;
-        /// Milliseconds.
-        Milliseconds = "ms", 1e-3;
-        /// Seconds.
-        Seconds = "s", 1.0;
-        /// Minutes.
-        Minutes = "min", 60.0;
-        /// Hours.
-        Hours = "h", 3600.0;
-        /// Days, as in spreadsheets and Matlab.
-        Days = "d", 86_400.0;
-    }
-}
-
-unit! {
-    /// A unit of elevation.
-    LengthUnit {
-        /// Millimetres.
-        Millimetres = "mm", 1e-3;
-        /// Centimetres.
-        Centimetres = "cm", 1e-2;
-        /// Metres.
-        Metres = "m", 1.0;
-        /// Feet.
-        Feet = "ft", 0.3048;
-    }
 }
 
 impl Table {
@@ -183,7 +132,11 @@ impl Table {
             None => self.guess_value(time)?,
         };
         let name = self.names()[value].clone();
-        let unit = choice.unit.or_else(|| LengthUnit::of_name(&name)).unwrap_or(LengthUnit::Metres);
+        let unit = match (choice.unit, LengthUnit::stated(&name)) {
+            (Some(unit), _) | (None, Stated::Unit(unit)) => unit,
+            (None, Stated::Nothing) => LengthUnit::Metres,
+            (None, Stated::Unknown(unit)) => return Err(ChoiceError::NoLength { name, unit }),
+        };
         let elevation_m: Vec<f64> = self.column(value).iter().map(|reading| reading * unit.factor()).collect();
         if elevation_m.iter().all(|reading| reading.is_nan()) {
             return Err(ChoiceError::AllMissing { name });
@@ -193,8 +146,14 @@ impl Table {
             (None, None) => return Err(ChoiceError::NoTime { names: self.names().to_vec() }),
             (None, Some(rate_hz)) => (0..elevation_m.len()).map(|i| i as f64 / rate_hz).collect(),
             (Some(column), rate_hz) => {
-                let unit = choice.time_unit.or_else(|| TimeUnit::of_name(&self.names()[column])).unwrap_or(TimeUnit::Seconds);
-                let factor = if is_dated { 1.0 } else { unit.factor() };
+                let name = &self.names()[column];
+                let factor = match (choice.time_unit, TimeUnit::stated(name)) {
+                    // Dates are seconds, whatever zone or format stands beside their name.
+                    _ if is_dated => 1.0,
+                    (Some(unit), _) | (None, Stated::Unit(unit)) => unit.factor(),
+                    (None, Stated::Nothing) => 1.0,
+                    (None, Stated::Unknown(unit)) => return Err(ChoiceError::NoTimeUnit { name: name.clone(), unit }),
+                };
                 let stamp_s: Vec<f64> = self.column(column).iter().map(|stamp| stamp * factor).collect();
                 if let Some(rate_hz) = rate_hz {
                     agree(&stamp_s, rate_hz)?;

@@ -75,6 +75,36 @@ fn columns_go_by_name_number_and_unit() {
     assert_eq!(readings(text, &millimetres).elevation_m, [0.01, 0.02, 0.03]);
 }
 
+/// One millimetre, said in as many ways; and what is said to be something else is not taken for metres.
+#[test]
+fn a_unit_is_read_wherever_it_stands() {
+    for (text, factor) in [
+        ("time (s),Level (MM)\n0,1\n1,2\n2,3\n", 1e-3),
+        ("# time, eta\n# s, mm\n0,1\n1,2\n2,3\n", 1e-3),
+        ("#t   eta\n#s   cm\n0 1\n1 2\n2 3\n", 1e-2),
+        ("Lake 5\ntime;water level\ns;ft\n0;1\n1;2\n2;3\n", 0.3048),
+        ("time,eta\n[s],[in]\n0,1\n1,2\n2,3\n", 0.0254),
+        ("time,eta\n0,1\n1,2\n2,3\n", 1.0),
+    ] {
+        let found = readings(text, &Choice::default());
+        let expected: Vec<f64> = [1.0, 2.0, 3.0].iter().map(|x| x * factor).collect();
+        assert_eq!(found.elevation_m, expected, "{text:?} {found:?}");
+    }
+    for text in [
+        "time,pressure (dbar)\n0,1\n1,2\n2,3\n",
+        "time,level\ns,kPa\n0,1\n1,2\n2,3\n",
+        "#time eta\n#s counts\n0 1\n1 2\n2 3\n",
+        "time,level_psi\n0,1\n1,2\n2,3\n",
+    ] {
+        let error = read(text).readings(&Choice::default()).unwrap_err();
+        assert!(matches!(error, ChoiceError::NoLength { .. }), "{text:?} {error}");
+        let metres = Choice { unit: Some(LengthUnit::Metres), ..Choice::default() };
+        assert_eq!(readings(text, &metres).elevation_m, [1.0, 2.0, 3.0]);
+    }
+    let fortnights = read("time (fortnights),eta\n0,1\n1,2\n2,3\n").readings(&Choice::default());
+    assert!(matches!(fortnights, Err(ChoiceError::NoTimeUnit { .. })));
+}
+
 #[test]
 fn a_rate_that_the_stamps_contradict_is_refused() {
     let text = "time,eta\n0,1\n0.1,2\n0.2,3\n0.3,2\n";

@@ -90,6 +90,29 @@ fn spikes_are_rejected_and_the_waves_are_not() {
     assert_eq!(spike(&mut ordered(&[0.0, 1.0, 2.0], &[0.0, 0.0, 9.0]), &ReadingLimits::default()).flag, Flag::NotEvaluated);
 }
 
+/// Ten minutes of calm and three high waves, eight readings to each: their crests are far beyond four deviations, one or two readings at a time.
+#[test]
+fn the_highest_waves_of_a_growing_sea_are_no_spikes() {
+    let wave = |i: usize| if i < 1200 { 0.01 } else { 1.0 } * (std::f64::consts::TAU * i as f64 / 8.0 + 0.4).sin();
+    let stamp_s: Vec<f64> = (0..1224).map(|i| i as f64 * 0.5).collect();
+    let mut elevation_m: Vec<f64> = (0..1224).map(wave).collect();
+    let mut series = ordered(&stamp_s, &elevation_m);
+    let finding = spike(&mut series, &ReadingLimits::default());
+    assert_eq!(finding.flag, Flag::Suspect, "they are named");
+    assert!(series.readings.iter().all(Reading::is_good), "and stay");
+    elevation_m[600] = 2.0;
+    let mut series = ordered(&stamp_s, &elevation_m);
+    spike(&mut series, &ReadingLimits::default());
+    assert_eq!(series.readings.iter().filter(|reading| !reading.is_good()).count(), 1);
+}
+
+/// A lake gauge above a datum, as far from zero as an instrument's range reaches.
+#[test]
+fn a_level_above_a_datum_is_no_error() {
+    let (stamp_s, elevation_m) = sine(174.3);
+    assert_eq!(range(&mut ordered(&stamp_s, &elevation_m), &ReadingLimits::default()).flag, Flag::Pass);
+}
+
 #[test]
 fn the_instrument_and_the_place_have_their_ranges() {
     let (stamp_s, mut elevation_m) = sine(7.0);
