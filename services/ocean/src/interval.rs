@@ -7,12 +7,15 @@
 //! | mean periods | the spectrum's moments and their covariances, to first order |
 //! | peak period | the frequencies about the peak whose density may be as high as the peak's |
 //!
+//! A taper weighs the samples unevenly, and leaves fewer of them: a single segment under Hann's tells as much as (3/8)²/(35/128) = 0.51 of its length.
 //! Of a Gaussian sea of length T the moments mₐ and m_b have the covariance (1/T) ∫ fᵃ⁺ᵇ S²(f) df (Bendat and Piersol 2010, 8.5).
 
 use crate::confidence::variance_factors_95;
 use crate::crossing::{Wave, WaveStatistics};
+use crate::height::{H_S_OVER_ROOT_M0, H_TENTH_OVER_ROOT_M0};
 use crate::record::Record;
-use crate::welch::{SampledSpectrum, SpectralStatistics, Welch};
+use crate::shape::Scatter;
+use crate::welch::{SampledSpectrum, SpectralStatistics, Taper, Welch};
 
 /// Low and high end.
 pub type Interval = (f64, f64);
@@ -103,6 +106,16 @@ impl WaveIntervals {
     }
 }
 
+impl WaveIntervals {
+    /// The same with an upper end of H_1/10 that is no lower than H_m0's (`h_m0_high_m`) has it for Rayleigh heights, 5.091/4.004 of it
+    /// (Longuet-Higgins 1952): of few waves the highest tenth is one or two, and a redrawn record has no higher one than was seen.
+    #[must_use]
+    pub fn not_below(mut self, h_m0_high_m: f64) -> Self {
+        self.h_tenth_m.1 = self.h_tenth_m.1.max(H_TENTH_OVER_ROOT_M0 / H_S_OVER_ROOT_M0 * h_m0_high_m);
+        self
+    }
+}
+
 /// Two-sided 95 % of Student's distribution: Cornish and Fisher's expansion, good to a percent from four degrees of freedom on.
 pub(crate) fn student_95(freedom: f64) -> f64 {
     NORMAL_95 + 2.372_27 / freedom + 2.822_5 / freedom.powi(2) + 2.555_8 / freedom.powi(3)
@@ -179,9 +192,16 @@ pub struct SpectralIntervals {
 }
 
 impl SpectralIntervals {
-    /// Of `found` in the band `low_hz`…`high_hz` of `spectrum`, which is one of `record`; `None` without energy.
+    /// Of `found` in the band `low_hz`…`high_hz` of `spectrum`, which is one of `record` under Hann's window; `None` without energy.
     #[must_use]
-    pub fn of(
+    pub fn of(record: &Record, spectrum: &SampledSpectrum, found: &SpectralStatistics, band_hz: Interval) -> Option<Self> {
+        Self::under(Taper::Hann, record, spectrum, found, band_hz)
+    }
+
+    /// The same under another window.
+    #[must_use]
+    pub fn under(
+        taper: Taper,
         record: &Record,
         spectrum: &SampledSpectrum,
         found: &SpectralStatistics,
@@ -197,9 +217,13 @@ impl SpectralIntervals {
             let all = fine.density_m2_per_hz().iter().enumerate().skip(1).map(|(i, density)| (i as f64 * df_hz, *density));
             all.filter(|(f, _)| (low_hz..=high_hz).contains(f))
         };
+        // What the segments of the spectrum itself see of the record.
+        let segment_samples = (record.rate_hz() / spectrum.df_hz()).round() as usize;
+        let seen = Scatter::of(&Welch { segment_samples, taper }, record.samples_m().len());
+        let seen_s = seen.map_or(duration_s, |seen| 0.5 * seen.joint_dof() * segment_samples as f64 / record.rate_hz());
         let covariance = |order: i32| {
             let sum: f64 = lines().map(|(f, density)| f.powi(order) * density * density * df_hz).sum();
-            sum / (duration_s * per_line * CLAIMED)
+            sum / (seen_s * per_line * CLAIMED)
         };
         let m = [-1, 0, 1, 2].map(|order| fine.moment(order, low_hz, high_hz));
         if !(m[1] > 0.0 && duration_s > 0.0) {
@@ -207,11 +231,13 @@ impl SpectralIntervals {
         }
         let relative = |a: i32, b: i32| covariance(a + b) / (m[(a + 1) as usize] * m[(b + 1) as usize]);
         let degrees_of_freedom = (2.0 / relative(0, 0)).max(1.0);
-        let (low, high) = variance_factors_95(degrees_of_freedom);
+        // They are known from the record, too, from about half as many independent squares: Student's tails instead of the normal's.
+        let widen = student_95(0.5 * degrees_of_freedom) / NORMAL_95;
+        let (low, high) = variance_factors_95((degrees_of_freedom / (widen * widen)).max(1.0));
         // Deviation of the logarithm of m_a/m_b; periods are positive, and their intervals multiply.
         let ratio = |a: i32, b: i32| (relative(a, a) + relative(b, b) - 2.0 * relative(a, b)).max(0.0).sqrt();
         let around = |value: f64, deviation: f64| {
-            let factor = (NORMAL_95 * deviation).exp();
+            let factor = (NORMAL_95 * widen * deviation).exp();
             (value / factor, value * factor)
         };
         Some(Self {
