@@ -16,7 +16,8 @@ pub struct ReadingLimits {
     pub gap_suspect_samples: usize,
     /// This many fail, and the record is cut there. 8.
     pub gap_fail_samples: usize,
-    /// What the instrument can give about the median, metres; what is outside fails and is rejected. −20 to 20 m.
+    /// What the instrument can give about the median, metres; what is outside fails and is rejected. −20 to 20 m. About the median, for levels
+    /// are counted from data: a lake's is 174 m.
     pub instrument_m: RangeInclusive<f64>,
     /// What the place can give about the median, metres; outside is suspect, and kept. −5 to 5 m.
     pub local_m: RangeInclusive<f64>,
@@ -156,22 +157,8 @@ pub fn range(series: &mut Ordered, limits: &ReadingLimits) -> Finding {
     Finding::new(Test::Range, flag, reason).about(indices)
 }
 
-/// Whether a run of readings, far from the mean by `deviation_m`, is the top of a wave: the readings beside it are on their way there. The highest
-/// waves of a growing sea are far from the mean of all of it, and no spikes.
-fn is_crest(readings: &[Reading], run: &[usize], deviation_m: impl Fn(&Reading) -> f64) -> bool {
-    /// Of a wave with eight readings, or more, those beside its highest two have at least this share of its height.
-    const BESIDE_MIN: f64 = 0.3;
-    let (Some(first), Some(last)) = (run.first(), run.last()) else { return false };
-    let beside = [first.checked_sub(1), Some(last + 1)];
-    let highest_m =
-        run.iter().map(|place| deviation_m(&readings[*place])).fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
-    beside.iter().all(|place| {
-        let reading = place.and_then(|place| readings.get(place)).filter(|reading| reading.is_good());
-        reading.is_some_and(|reading| deviation_m(reading) / highest_m >= BESIDE_MIN)
-    })
-}
-
-/// Test 10: readings far from the mean, alone or a few in a row, are rejected, unless they are the top of a wave. Names them, and those that stay.
+/// Test 10: readings far from the mean, alone or a few in a row, are rejected. Names them, and those that stay: of longer runs, and of what
+/// is continuous, as a wave is, or no further out than the water about it moves ([`is_wave`]).
 pub fn spike(series: &mut Ordered, limits: &ReadingLimits) -> Finding {
     let (_, _, count) = moments(series);
     if count == 0 {
@@ -183,7 +170,7 @@ pub fn spike(series: &mut Ordered, limits: &ReadingLimits) -> Finding {
         return Finding::new(Test::Spike, Flag::NotEvaluated, reason);
     }
     let mut rejected = Vec::new();
-    let mut kept = Vec::new();
+    let mut runs_too_long = Vec::new();
     for _ in 0..limits.spike_passes.max(1) {
         let (mean_m, sigma_m, _) = moments(series);
         // Rounding alone makes the deviation of a constant differ from zero.
@@ -192,12 +179,11 @@ pub fn spike(series: &mut Ordered, limits: &ReadingLimits) -> Finding {
         };
         let outside: Vec<usize> =
             (0..series.readings.len()).filter(|i| series.readings[*i].is_good() && far(&series.readings[*i])).collect();
-        kept.clear();
+        runs_too_long.clear();
         let mut short = Vec::new();
         for run in outside.chunk_by(|a, b| a + 1 == *b) {
-            let is_spike =
-                run.len() <= limits.spike_run_samples_max && !is_crest(&series.readings, run, |r| r.elevation_m - mean_m);
-            if is_spike { &mut short } else { &mut kept }.extend_from_slice(run);
+            let stays = run.len() > limits.spike_run_samples_max || is_wave(series, run, mean_m, limits);
+            if stays { &mut runs_too_long } else { &mut short }.extend_from_slice(run);
         }
         if short.is_empty() {
             break;
@@ -205,19 +191,54 @@ pub fn spike(series: &mut Ordered, limits: &ReadingLimits) -> Finding {
         rejected.extend(reject(series, &short));
     }
     let share = rejected.len() as f64 / count as f64;
-    let flag = match rejected.len() + kept.len() {
+    let flag = match rejected.len() + runs_too_long.len() {
         0 => Flag::Pass,
         _ if share >= limits.rejected_fail_share => Flag::Fail,
         _ => Flag::Suspect,
     };
     let reason = format!(
-        "{} spikes beyond {} deviations rejected, {} such readings in longer runs or at the top of waves kept",
+        "{} spikes beyond {} deviations rejected, {} such readings in longer runs or waves kept",
         rejected.len(),
         limits.spike_sigmas,
-        kept.len()
+        runs_too_long.len()
     );
-    rejected.extend(kept.iter().map(|place| series.readings[*place].index));
+    rejected.extend(runs_too_long.iter().map(|place| series.readings[*place].index));
     Finding::new(Test::Spike, flag, reason).about(rejected)
+}
+
+/// Whether a few readings far from the mean of the record are water: the readings to both sides lie on their side of the mean and a third
+/// as far out (a sine of six samples a period has half), or the readings of a quarter of a minute before or after move so much that these do
+/// not stand out, as where a sea grows. Of those a few spikes do not change the scale, which is that of a normal distribution by the median.
+fn is_wave(series: &Ordered, run: &[usize], mean_m: f64, limits: &ReadingLimits) -> bool {
+    const NEIGHBOUR_SHARE: f64 = 1.0 / 3.0;
+    const AROUND_S: f64 = 15.0;
+    const READINGS_MIN: usize = 16;
+    const SIGMA_OVER_MEDIAN: f64 = 1.4826;
+    let (Some(&first), Some(&last)) = (run.first(), run.last()) else { return false };
+    let off_m = |place: usize| series.readings.get(place).filter(|r| r.is_good()).map(|r| r.elevation_m - mean_m);
+    let furthest = run.iter().filter_map(|place| off_m(*place)).fold(0.0_f64, |a, b| if b.abs() > a.abs() { b } else { a });
+    let beside = [first.checked_sub(1), last.checked_add(1)];
+    // Beyond a gap is no neighbour.
+    let near = |place: usize, of: usize| {
+        (series.readings[place].stamp_s - series.readings[of].stamp_s).abs() < 1.5 * series.interval_s
+    };
+    let follows = |place: Option<usize>, of: usize| {
+        place.is_some_and(|place| off_m(place).is_some_and(|x| x / furthest >= NEIGHBOUR_SHARE) && near(place, of))
+    };
+    if follows(beside[0], first) && follows(beside[1], last) {
+        return true;
+    }
+    let (from_s, to_s) = (series.readings[first].stamp_s - AROUND_S, series.readings[last].stamp_s + AROUND_S);
+    let before = series.readings[..first].iter().rev().take_while(|r| r.stamp_s >= from_s);
+    let after = series.readings[last + 1..].iter().take_while(|r| r.stamp_s <= to_s);
+    let off = |r: &Reading| r.is_good().then_some((r.elevation_m - mean_m).abs());
+    // Either side: where a sea begins to grow there is calm before, and where a record ends there is nothing after.
+    [before.filter_map(off).collect(), after.filter_map(off).collect()].into_iter().any(|mut side_m: Vec<f64>| {
+        let middle = side_m.len() / 2;
+        side_m.len() >= READINGS_MIN
+            && furthest.abs()
+                < limits.spike_sigmas * SIGMA_OVER_MEDIAN * *side_m.select_nth_unstable_by(middle, f64::total_cmp).1
+    })
 }
 
 /// Test 12: steps between the means of successive segments, against the deviation about these means. Names the first reading after

@@ -156,9 +156,10 @@ with_intervals! {
 }
 
 impl ZeroCrossing {
-    fn of(waves: &[Wave]) -> Option<Self> {
+    /// `h_m0_high_m` is the upper bound of H_m0 by the spectrum, where there is one.
+    fn of(waves: &[Wave], h_m0_high_m: Option<f64>) -> Option<Self> {
         let found = WaveStatistics::of(waves)?;
-        let bounds = WaveIntervals::of(waves);
+        let bounds = WaveIntervals::of(waves).map(|bounds| h_m0_high_m.map_or(bounds, |high_m| bounds.not_below(high_m)));
         let low = |pick: fn(&WaveIntervals) -> Interval| bounds.as_ref().map(|bounds| pick(bounds).0);
         let high = |pick: fn(&WaveIntervals) -> Interval| bounds.as_ref().map(|bounds| pick(bounds).1);
         Some(Self {
@@ -210,9 +211,9 @@ with_intervals! {
 }
 
 impl Spectrum {
-    fn of(record: &Record, density: &SampledSpectrum, (low_hz, high_hz): (f64, f64)) -> Option<Self> {
+    fn of(taper: Taper, record: &Record, density: &SampledSpectrum, (low_hz, high_hz): (f64, f64)) -> Option<Self> {
         let found = density.statistics(low_hz, high_hz)?;
-        let bounds = SpectralIntervals::of(record, density, &found, (low_hz, high_hz));
+        let bounds = SpectralIntervals::under(taper, record, density, &found, (low_hz, high_hz));
         let moment = |order| density.moment(order, low_hz, high_hz);
         let low = |pick: fn(&SpectralIntervals) -> Interval| bounds.as_ref().map(|bounds| pick(bounds).0);
         let high = |pick: fn(&SpectralIntervals) -> Interval| bounds.as_ref().map(|bounds| pick(bounds).1);
@@ -289,7 +290,8 @@ impl Burst {
         let welch = Welch { taper, ..Welch::with_segments_of_s(segment_s, &record) };
         let density = welch.spectrum(&record)?;
         let band_hz = (band_hz.0, band_hz.1.min(0.5 * record.rate_hz()));
-        let spectrum = Spectrum::of(&record, &density, band_hz);
+        let spectrum = Spectrum::of(taper, &record, &density, band_hz);
+        let h_m0_high_m = spectrum.as_ref().and_then(|spectrum| spectrum.h_m0_m_high);
         let crest_statistics = spectrum.as_ref().map_or_else(Vec::new, |spectrum| crests(&up, spectrum, &density));
         Ok(Self {
             number: None,
@@ -303,8 +305,8 @@ impl Burst {
             slow_deviation_m,
             skewness: record.skewness(),
             kurtosis: record.kurtosis(),
-            zero_up: ZeroCrossing::of(&up),
-            zero_down: ZeroCrossing::of(&waves(&record, Crossing::Down, 0.0)),
+            zero_up: ZeroCrossing::of(&up, h_m0_high_m),
+            zero_down: ZeroCrossing::of(&waves(&record, Crossing::Down, 0.0), h_m0_high_m),
             spectrum,
             shape: Shape::of(&welch, record.samples_m().len(), &density, band_hz),
             crest_statistics,

@@ -1,7 +1,6 @@
 //! A verdict on a record of one gauge, by the limits that patches are judged by.
 
 use halcyon_model::{Estimate, VerdictState};
-use halcyon_ocean::height::H_TENTH_OVER_ROOT_M0;
 use serde::Serialize;
 
 use super::{Band, Burst, WavesReport};
@@ -117,9 +116,6 @@ fn statistics(burst: &Burst, baseline_m: f64) -> Option<Statistics> {
     let Band { low_hz, high_hz } = spectrum.band;
     let slope = burst.density.as_ref()?.slope_variance(baseline_m, low_hz, high_hz).sqrt();
     let h_m0_m = estimate(spectrum.h_m0_m, spectrum.h_m0_m_low, spectrum.h_m0_m_high);
-    // A bootstrap of few waves does not know what waves it has not seen: the spectrum's bound, by Longuet-Higgins's (1952) ratio, does.
-    let by_spectrum = h_m0_m.high * H_TENTH_OVER_ROOT_M0 / 4.0;
-    let h_tenth_high = up.h_tenth_m_high.map(|high| high.max(by_spectrum));
     // A slope is a root of a variance, and steep waves are short: it is known at least as well as a height.
     let share = |bound: f64| bound / h_m0_m.value * slope;
     Some(Statistics {
@@ -131,7 +127,7 @@ fn statistics(burst: &Burst, baseline_m: f64) -> Option<Statistics> {
         h_max_m: Estimate { value: up.h_max_m, low: up.h_max_m, high: up.h_max_m },
         h_m0_m,
         h_rms_m: estimate(up.h_rms_m, up.h_rms_m_low, up.h_rms_m_high),
-        h_tenth_m: estimate(up.h_tenth_m, up.h_tenth_m_low, h_tenth_high),
+        h_tenth_m: estimate(up.h_tenth_m, up.h_tenth_m_low, up.h_tenth_m_high),
         freedom: 1.0,
         spectral: None,
         t_z_s: Some(estimate(up.t_z_s, up.t_z_s_low, up.t_z_s_high)),

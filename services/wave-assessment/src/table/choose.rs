@@ -155,10 +155,16 @@ impl Table {
                     (None, Stated::Unknown(unit)) => return Err(ChoiceError::NoTimeUnit { name: name.clone(), unit }),
                 };
                 let stamp_s: Vec<f64> = self.column(column).iter().map(|stamp| stamp * factor).collect();
-                if let Some(rate_hz) = rate_hz {
-                    agree(&stamp_s, rate_hz)?;
+                match rate_hz {
+                    None => stamp_s,
+                    Some(rate_hz) => match spread(&stamp_s, rate_hz) {
+                        Some(spread_s) => spread_s,
+                        None => {
+                            agree(&stamp_s, rate_hz)?;
+                            stamp_s
+                        }
+                    },
                 }
-                stamp_s
             }
         };
         let time_column = time.map(|column| self.names()[column].clone());
@@ -226,6 +232,43 @@ fn rises(stamps: &[f64]) -> bool {
     let (Some(first), Some(last)) = (known.first(), known.last()) else { return false };
     let way: f64 = known.windows(2).map(|pair| (pair[1] - pair[0]).abs()).sum();
     known.len() > 1 && known.len() * 2 > stamps.len() && last - first > NET_MIN * way
+}
+
+/// Stamps that are cut off to whole seconds (or whatever the logger's clock shows), several readings to each, put at a stated rate within what they
+/// say; `None` where they are not so, or there are not as many readings as the rate has.
+fn spread(stamp_s: &[f64], rate_hz: f64) -> Option<Vec<f64>> {
+    let mut steps_s: Vec<f64> = stamp_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    // A missing stamp, or one out of order, is no clock that is read too seldom.
+    if steps_s.iter().any(|step| step.is_nan() || *step < 0.0) || !steps_s.iter().any(|step| *step == 0.0) {
+        return None;
+    }
+    steps_s.retain(|step| *step > 0.0);
+    if steps_s.is_empty() {
+        return None;
+    }
+    let middle = steps_s.len() / 2;
+    let tick_s = *steps_s.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let ticks = stamp_s.chunk_by(|a, b| a == b);
+    let rate = stamp_s.len() as f64 / (ticks.clone().count() as f64 * tick_s);
+    // The first and the last second may be cut, too.
+    let share = RATE_DISAGREEMENT_MAX + 2.0 / ticks.clone().count() as f64;
+    if tick_s * rate_hz < 1.5 || (rate / rate_hz - 1.0).abs() > share {
+        return None;
+    }
+    let step_s = 1.0 / rate_hz;
+    // The first tick's readings are its last ones.
+    let first = ticks.clone().next().map_or(0, <[f64]>::len);
+    let mut next_s = stamp_s.first()? + (tick_s - first as f64 * step_s).max(0.0);
+    let put = |stamp: &f64| {
+        // Where readings are missing, or the clocks have drifted a reading apart, the stamps say so.
+        if next_s < stamp - step_s || next_s >= stamp + tick_s + step_s {
+            next_s = *stamp;
+        }
+        let at_s = next_s;
+        next_s += step_s;
+        at_s
+    };
+    Some(stamp_s.iter().map(put).collect())
 }
 
 /// Whether stamps are a stated rate's.

@@ -113,6 +113,19 @@ fn a_rate_that_the_stamps_contradict_is_refused() {
     assert!(matches!(with(2.0), Err(ChoiceError::RatesDisagree { .. })));
 }
 
+/// A clock that shows whole seconds, read four times a second, from the middle of a second on and with a second lost.
+#[test]
+fn whole_seconds_and_a_rate_are_the_rate() {
+    let truth = |i: usize| 100.5 + 0.25 * i as f64 + if i >= 30 { 1.0 } else { 0.0 };
+    let text: String = (0..60).map(|i| format!("{},{i}\n", truth(i).floor())).collect();
+    let found = readings(&format!("time,eta\n{text}"), &Choice { rate_hz: Some(4.0), ..Choice::default() });
+    for (i, stamp_s) in found.stamp_s.iter().enumerate() {
+        assert!((stamp_s - truth(i)).abs() < 1e-9, "{i}: {stamp_s} for {}", truth(i));
+    }
+    let wrong = read(&format!("time,eta\n{text}")).readings(&Choice { rate_hz: Some(10.0), ..Choice::default() });
+    assert!(matches!(wrong, Err(ChoiceError::RatesDisagree { .. })), "four readings a second are no ten");
+}
+
 #[test]
 fn what_is_no_table_is_told_by_line() {
     let error = |text: &[u8]| Table::read(text).unwrap_err();
