@@ -1,4 +1,4 @@
-//! The fail-safes that watch over every flight. Each row names its test, in `tests/failsafes.rs`, `tests/mishaps.rs`, `tests/heed.rs` or `tests/pilot.rs`.
+//! The fail-safes that watch over every flight. Each row names its test, in `tests/failsafes.rs`, `tests/mishaps.rs` or `tests/pilot.rs`.
 //!
 //! | what happens | what it does | until | test |
 //! |---|---|---|---|

@@ -557,7 +557,7 @@ fn afloat_on_waves_the_motors_stop_though_the_autopilot_finds_no_end() {
 #[test]
 fn every_fail_safe_of_the_table_has_its_test() {
     let table = include_str!("../failsafe.rs");
-    let tests = [include_str!("failsafes.rs"), include_str!("mishaps.rs")].concat();
+    let tests = [include_str!("failsafes.rs"), include_str!("mishaps.rs"), include_str!("pilot.rs")].concat();
     let rows: Vec<&str> = table.lines().filter(|line| line.starts_with("//! |")).skip(2).collect();
     assert!(rows.len() > 20);
     for row in rows {
