@@ -299,7 +299,12 @@ fn how_written(text: &str) -> Option<Style> {
     // The first of the best: `max_by_key` would take the last.
     let (_, columns, mut style) = good.rev().max_by_key(|(_, columns, _)| *columns)?;
     let data = || sample.iter().filter(|line| is_data(&style.read(line)));
-    if style.separator == Separator::Char(',') && columns == 2 && is_decimal(data().map(|line| style.cut(line))) {
+    // Two names are of two columns, whatever the numbers look like: whole seconds that repeat do not rise.
+    let is_named = sample.iter().map(|line| style.cut(line)).any(|cells| {
+        cells.len() == 2
+            && cells.iter().all(|cell| cell.chars().any(char::is_alphabetic) && Cell::read(cell, false) == Cell::Text)
+    });
+    if style.separator == Separator::Char(',') && columns == 2 && !is_named && is_decimal(data().map(|line| style.cut(line))) {
         return Some(Style { comma_is_decimal: true, ..Style::new(Separator::Char(';')) });
     }
     style.is_closed = columns > 1 && data().all(|line| style.cut(line).last() == Some(&""));
