@@ -2,7 +2,7 @@
 //! in, messages to send out.
 
 use halcyon_model::{FleetOrigin, FlightMode, LinkQuality, Stamp, VehicleState};
-use mavlink::dialects::ardupilotmega::{MavAutopilot, MavMessage};
+use mavlink::dialects::ardupilotmega::{MavAutopilot, MavCmd, MavMessage};
 use mavlink::{MavHeader, Message as _};
 
 use crate::config::Config;
@@ -118,7 +118,6 @@ impl Autopilot {
         self.identity.observe(message);
         self.telemetry.set_boot_offset_ns(self.sync.offset_ns(now));
         self.streams.observe(message.message_id(), now);
-        self.local.observe(message, &self.datum(), now);
         heard.transfer = self.transfers.observe(message, (system, OWN_COMPONENT), now);
         match message {
             MavMessage::STATUSTEXT(data) => heard.text = self.texts.observe(data, now).map(|text| text.text.clone()),
@@ -126,6 +125,8 @@ impl Autopilot {
             MavMessage::COMMAND_ACK(data) => self.commands.observe_ack(data, system, OWN_COMPONENT, now),
             other => heard.state = self.telemetry.observe(other, now),
         }
+        // After the telemetry, which knows by this message whether home was set anew.
+        self.local.observe(message, &self.datum(), now);
         heard
     }
 
@@ -302,6 +303,7 @@ impl Autopilot {
             self.commands.observe_heartbeat(mode, armed, heard);
         }
         effects.extend(self.commands.poll(address, &self.texts, now));
+        self.count_from_home(&mut effects);
         if family == Family::Px4 {
             effects = effects.into_iter().filter_map(|effect| self.fitted(effect)).collect();
         }
@@ -312,6 +314,20 @@ impl Autopilot {
         effects.extend(self.sync.ask(address, now).map(Effect::Send));
         effects.extend(self.identity.ask(address, now).map(Effect::Send));
         effects
+    }
+
+    /// A take-off's height is above the home that the autopilot counts from now.
+    fn count_from_home(&self, effects: &mut [Effect]) {
+        let rise_m = self.telemetry.home_rise_m() as f32;
+        for effect in effects {
+            match effect {
+                Effect::Send(MavMessage::COMMAND_LONG(data)) if data.command == MavCmd::MAV_CMD_NAV_TAKEOFF => {
+                    data.param7 -= rise_m
+                }
+                Effect::Send(MavMessage::COMMAND_INT(data)) if data.command == MavCmd::MAV_CMD_NAV_TAKEOFF => data.z -= rise_m,
+                _ => {}
+            }
+        }
     }
 
     fn fitted(&self, effect: Effect) -> Option<Effect> {
@@ -476,6 +492,12 @@ mod tests {
         let with = here(Some(nalgebra::Vector3::zeros()));
         let Some(MavMessage::SET_POSITION_TARGET_LOCAL_NED(sent)) = autopilot.setpoint(&with, t(9.6)) else { panic!() };
         assert!((sent.z + 7.0).abs() < 1e-6, "{}", sent.z);
+        autopilot.submit(1, Command::TakeOff { height_above_home_m: 5.0 }).unwrap();
+        let take_off = autopilot.poll(t(9.6)).into_iter().find_map(|effect| match effect {
+            Effect::Send(MavMessage::COMMAND_LONG(data)) if data.command == MavCmd::MAV_CMD_NAV_TAKEOFF => Some(data.param7),
+            _ => None,
+        });
+        assert_eq!(take_off, Some(0.0), "home is as high as it was to climb");
         // No home is a thousand kilometres lower.
         autopilot.observe(header, &home(-1_000_000_000), t(9.7));
         autopilot.observe(header, &position(5_000), t(9.7));

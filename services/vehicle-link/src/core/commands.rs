@@ -240,12 +240,12 @@ impl Commands {
     }
 
     /// The autopilot's heartbeat, which came at `heard`. What it shows to be done is not asked for again, though no acknowledgement came: the
-    /// pilot may undo it any moment.
+    /// pilot may undo it any moment. But for a termination, which ends when the autopilot says so: the heartbeat may be older than it.
     pub fn observe_heartbeat(&mut self, mode: FlightMode, armed: bool, heard: Stamp) {
         for open in &mut self.open {
             let done = match open.command {
                 Command::Arm => armed,
-                Command::Disarm { .. } => !armed,
+                Command::Disarm { force } => !armed && !force,
                 Command::SetMode(wanted) => mode == wanted,
                 Command::TakeOff { .. } | Command::SetHome | Command::SetInterval(_) | Command::Payload(_) => false,
             };

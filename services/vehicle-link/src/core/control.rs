@@ -19,6 +19,8 @@ pub enum Change {
     ChosenAnew,
     /// It was handed back.
     HandedBack,
+    /// The pilot's own flight ended with the motors off: it is nobody's now.
+    Over,
 }
 
 /// Follows the flight mode.
@@ -31,7 +33,8 @@ pub struct Control {
     ours: Option<FlightMode>,
     hands_off: bool,
     since_start: bool,
-    /// The autopilot started again, or a person flies it in GUIDED: GUIDED must be *set*, that it is GUIDED hands nothing back.
+    /// It was taken from us, or the autopilot started again: GUIDED must be *set*; that it is GUIDED, or that the motors are off, hands
+    /// nothing back.
     must_be_set: bool,
 }
 
@@ -61,8 +64,8 @@ impl Control {
         self.hands_off && self.since_start
     }
 
-    /// Hands off until GUIDED is set, whatever the mode is: the autopilot started again in flight, and nobody asked for the mode that
-    /// it comes up in; or a person's ground station flies it.
+    /// Hands off until GUIDED is set, whatever the mode is and whether or not the motors run: a person took it from us, and may stand
+    /// beside it once it is down; or the autopilot started again in flight, and nobody asked for the mode that it comes up in.
     pub fn let_go(&mut self) {
         *self = Self { last: self.last, unanswered: self.unanswered, hands_off: true, must_be_set: true, ..Self::default() };
     }
@@ -91,6 +94,7 @@ impl Control {
         let first = self.last.is_none();
         let changed = self.last.is_some_and(|last| last.0 != mode);
         let disarmed = self.last.is_some_and(|last| last.1) && !armed;
+        let mut is_over = false;
         self.last = Some((mode, armed));
         self.expected = self.expected.filter(|(_, at)| now.seconds_since(*at) <= EXPECT_S);
         if first {
@@ -109,7 +113,7 @@ impl Control {
             // Whoever set it: this is how the vehicle is handed back.
             self.hands_off = false;
             self.must_be_set = false;
-        } else if self.must_be_set && armed {
+        } else if self.must_be_set {
             self.hands_off = true;
         } else if changed {
             // On the ground too, once we had set a mode: setting it again would be a fight.
@@ -121,8 +125,8 @@ impl Control {
             self.hands_off = true;
         } else if disarmed {
             // The flight is over; so is whoever's turn it was.
+            is_over = self.hands_off;
             self.hands_off = false;
-            self.must_be_set = false;
             self.ours = None;
         }
         if changed && !first {
@@ -130,6 +134,7 @@ impl Control {
         }
         match (before, self.hands_off) {
             (false, true) => Change::TakenOver,
+            (true, false) if is_over => Change::Over,
             (true, false) => Change::HandedBack,
             (true, true) if changed => Change::ChosenAnew,
             _ => Change::None,
@@ -224,7 +229,8 @@ mod tests {
         let mut control = Control::default();
         control.observe(Loiter, false, t(0.0));
         assert_eq!(control.observe(Loiter, true, t(1.0)), Change::TakenOver);
-        assert_eq!(control.observe(Loiter, false, t(60.0)), Change::HandedBack);
+        assert_eq!(control.observe(Loiter, false, t(60.0)), Change::Over);
+        assert!(!control.hands_off());
     }
 
     #[test]
@@ -254,8 +260,14 @@ mod tests {
         let mut control = flying();
         control.expect(Guided, t(1.0));
         assert_eq!(control.observe(Guided, true, t(1.2)), Change::HandedBack);
+        // Down and off, and set to something else there.
         let mut control = flying();
-        assert_eq!(control.observe(Guided, false, t(1.0)), Change::HandedBack, "down and off");
+        control.observe(Guided, false, t(1.0));
+        control.observe(Stabilize, false, t(2.0));
+        control.observe(Stabilize, true, t(3.0));
+        control.observe(Stabilize, false, t(4.0));
+        assert!(control.hands_off());
+        assert_eq!(control.observe(Guided, false, t(5.0)), Change::HandedBack);
     }
 
     #[test]

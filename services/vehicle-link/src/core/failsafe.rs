@@ -4,13 +4,15 @@
 //! |---|---|---|---|
 //! | autopilot silent | sends nothing; the autopilot hovers by itself | it is heard | `a_silent_autopilot_is_sent_nothing_and_taken_up_again` |
 //! | autopilot starts again in flight | hands off, everything under way withdrawn, streams asked for again | GUIDED is set | `an_autopilot_that_starts_again_in_flight_is_left_alone_until_guided_is_set` |
-//! | pilot changes the mode | hands off, commands under way withdrawn | GUIDED is set again | `the_pilot_is_never_fought_and_hands_back_with_guided` |
+//! | pilot changes the mode | hands off, commands under way withdrawn; after he has landed, too | GUIDED is set again | `the_pilot_is_never_fought_and_hands_back_with_guided` |
 //! | a ground station on the relay flies it in GUIDED | the same | the same | `a_ground_station_that_flies_it_in_guided_is_a_pilot` |
 //! | the autopilot's own fail-safe changes it | the same | the same | `the_autopilots_own_fail_safe_is_not_fought_either_and_is_named` |
 //! | somebody stops the motors before a take-off | the same | the same | `motors_that_somebody_stopped_on_the_ground_stay_off_until_guided_is_set` |
-//! | estimator or GNSS bad | stops; then asks for LAND | it is good again, before LAND | `a_bad_estimator_stops_then_lands` |
+//! | motors stop in the air, or by a termination | the same | the same | `motors_that_stopped_in_the_air_stay_off_until_guided_is_set` |
+//! | guidance has nothing more to do in the air | holds | a task | `with_nothing_more_to_do_it_holds_and_does_not_fly_on` |
+//! | estimator or GNSS bad | stops; then asks for LAND | it is good again; once in LAND, for 5 s | `a_bad_estimator_stops_then_lands` |
 //! | battery under the land fraction | LAND where it is | disarmed | `battery_low_returns_and_stays_returning_battery_empty_lands_here` |
-//! | own position jumps | stops on velocity, no setpoint goes after it; then asks for LAND if it jumps on | it has settled and the estimator is good | `a_position_that_jumps_is_not_flown_after_and_is_believed_once_settled` |
+//! | own position jumps | stops on velocity, no setpoint goes after it; then asks for LAND if it jumps on | it has settled and the estimator is good; once in LAND, for 5 s | `a_position_that_jumps_is_not_flown_after_and_is_believed_once_settled` |
 //! | outside the fence | returns | inside, and a new task | `outside_the_fence_it_returns_and_a_task_outside_is_refused` |
 //! | battery under the return fraction | returns | disarmed | `battery_low_returns_and_stays_returning_battery_empty_lands_here` |
 //! | battery just enough for the way home | returns | disarmed | `a_battery_that_just_suffices_for_the_way_home_sends_it_there` |
@@ -119,6 +121,9 @@ impl Lasting {
     }
 }
 
+/// A landing that was begun for a bad estimator or a jump goes on until that has been over for so long, seconds: what comes and goes
+/// would have it go up and down.
+const RECOVERED_S: f64 = 5.0;
 /// Two steps are taken to be no further apart than this, seconds.
 const STEP_S_MAX: f64 = 1.5;
 
@@ -137,6 +142,8 @@ pub struct FailSafes {
     outside: bool,
     plan_lapsed: Lasting,
     leader_lost: Lasting,
+    /// The landing that was begun, and for how long its reason has been gone, seconds.
+    landing: Option<(Alarm, f64)>,
 }
 
 impl FailSafes {
@@ -179,9 +186,25 @@ impl FailSafes {
 
     /// The alarm in charge at `now`, if any. Call at every step in flight.
     pub fn step(&mut self, conditions: &Conditions, limits: &FailSafeLimits, now: Stamp) -> Option<Alarm> {
-        let own = conditions.own;
         let dt_s = self.stepped.map_or(0.0, |stepped| now.seconds_since(stepped)).clamp(0.0, STEP_S_MAX);
         self.stepped = Some(now);
+        let alarm = self.now(conditions, limits, dt_s);
+        if let Some(alarm) = alarm.as_ref().filter(|alarm| alarm.action == Action::Land) {
+            self.landing = Some((alarm.clone(), 0.0));
+        }
+        let Some((landing, gone_s)) = &mut self.landing else { return alarm };
+        let is_bad = !conditions.own.estimator_ok || conditions.jumped_m.is_some();
+        *gone_s = if is_bad { 0.0 } else { *gone_s + dt_s };
+        if *gone_s < RECOVERED_S {
+            return Some(landing.clone());
+        }
+        self.landing = None;
+        alarm
+    }
+
+    /// As things stand, whatever was begun.
+    fn now(&mut self, conditions: &Conditions, limits: &FailSafeLimits, dt_s: f64) -> Option<Alarm> {
+        let own = conditions.own;
         let estimator_s = self.estimator_bad.step(!own.estimator_ok, dt_s);
         let lapsed_s = self.plan_lapsed.step(conditions.plan == PlanHealth::Lapsed, dt_s);
         let refused = conditions.follow.as_ref().and_then(|follow| follow.as_ref().err());

@@ -101,6 +101,9 @@ pub fn onward(track: &Track, own_follows: bool, limits: &Limits, now: Stamp) -> 
     Some(Obstacle { position_ned_m, velocity_ned_mps, keep_m, ..stopped })
 }
 
+/// An obstacle whose direction has no more than this of the horizontal, as a fraction, is right above: within 11.5°.
+const STEEP: f64 = 0.2;
+
 /// Least opening speed (negative: greatest closing speed) at a gap to the kept distance, metres per second.
 fn opening_mps_min(gap_m: f64) -> f64 {
     if gap_m <= 0.0 {
@@ -120,6 +123,21 @@ struct Constraint {
     give: f64,
 }
 
+/// What `obstacle` forbids at that point: one half-space, or two.
+fn constraints(point_ned_m: Vector3<f64>, obstacle: &Obstacle) -> impl Iterator<Item = Constraint> {
+    let one = constraint(point_ned_m, obstacle);
+    let across = Vector3::new(one.normal.x, one.normal.y, 0.0);
+    if one.normal.z <= 0.0 || across.norm() > STEEP {
+        return [Some(one), None].into_iter().flatten();
+    }
+    // Right below it, going aside makes hardly any distance: no climbing after it, but no descent either; and where distance must be
+    // made, aside as fast as that.
+    let up = Constraint { normal: Vector3::z(), push: Vector3::z(), bound_mps: one.bound_mps.min(0.0), give: one.give };
+    let aside = if across.norm() > 1e-6 { across / across.norm() } else { Vector3::x() };
+    let aside = (one.bound_mps > 0.0).then_some(Constraint { normal: aside, push: aside, ..one });
+    [Some(up), aside].into_iter().flatten()
+}
+
 fn constraint(point_ned_m: Vector3<f64>, obstacle: &Obstacle) -> Constraint {
     let away_m = point_ned_m - obstacle.position_ned_m;
     let distance_m = away_m.norm();
@@ -131,13 +149,7 @@ fn constraint(point_ned_m: Vector3<f64>, obstacle: &Obstacle) -> Constraint {
     let bound_mps = coming_mps + opening_mps_min(distance_m - obstacle.keep_m);
     // Up is always free; down is not, so a vehicle below gives way sideways.
     let across = Vector3::new(normal.x, normal.y, 0.0);
-    let push = if normal.z <= 0.0 {
-        normal
-    } else if across.norm() > 0.2 {
-        across / across.norm()
-    } else {
-        Vector3::x()
-    };
+    let push = if normal.z <= 0.0 || across.norm() <= STEEP { normal } else { across / across.norm() };
     let give = GIVE * (distance_m / obstacle.keep_m.max(1e-3)).powi(2);
     Constraint { normal, push, bound_mps, give }
 }
@@ -226,10 +238,13 @@ pub fn filter(
     }
     let lead_m = points_ned_m[1] - points_ned_m[0];
     let pairs = obstacles.iter().flat_map(|obstacle| {
-        let [mut own, reference] = points_ned_m.map(|point| constraint(point, obstacle));
+        let [own, reference] = points_ned_m.map(|point| constraints(point, obstacle));
         // The autopilot flies after its reference by this much faster than it is asked to; after a place that has leapt it doesn't fly.
-        own.bound_mps += (-own.normal.dot(&lead_m) * CHASE_HZ).clamp(0.0, limits.speed_mps_max);
-        [own, reference]
+        let chased = own.map(move |one| {
+            let chase_mps = (-one.normal.dot(&lead_m) * CHASE_HZ).clamp(0.0, limits.speed_mps_max);
+            Constraint { bound_mps: one.bound_mps + chase_mps, ..one }
+        });
+        chased.chain(reference)
     });
     // Most are far off, and can't be broken by any speed that is flown.
     let fast_mps = velocity.norm().max(2.0 * limits.speed_mps_max);
@@ -306,6 +321,28 @@ mod tests {
         let below = Vector3::new(0.1, 0.0, -5.0);
         let aside = filter(Vector3::zeros(), [below, below], below, &[still(0.0, 0.0, -8.0)], &limits);
         assert!(aside.z.abs() < 1e-9 && aside.x > 0.5, "{aside}");
+    }
+
+    /// Exactly below or nearly, it makes room aside no faster than distance is made elsewhere, doesn't sink, and doesn't climb into what is
+    /// above; the side is the one that it is on.
+    #[test]
+    fn right_below_another_it_goes_aside_and_not_faster_than_it_must() {
+        let limits = Limits::default();
+        let above = still(0.0, 0.0, -8.0);
+        for (x, y) in [(0.0, 0.0), (1e-9, 0.0), (0.0, 0.3), (-0.4, 0.0)] {
+            let own = Vector3::new(x, y, -5.0);
+            let velocity = filter(Vector3::new(0.0, 0.0, -1.5), [own, own], own, &[above], &limits);
+            let aside_mps = velocity.xy().norm();
+            assert!((0.5..=OPENING_MPS_MAX + 1e-6).contains(&aside_mps), "{x} {y}: {velocity}");
+            assert!(velocity.z.abs() < 1e-6, "{velocity}");
+            let outward_mps = velocity.x * x + velocity.y * y;
+            assert!(outward_mps >= 0.0, "{velocity}");
+        }
+        // Far below it climbs, as fast as it can still stop.
+        let own = Vector3::new(0.0, 0.0, -1.0);
+        let high = still(0.0, 0.0, -9.0);
+        let climb = filter(Vector3::new(0.0, 0.0, -3.0), [own, own], own, &[high], &limits);
+        assert!((climb.z - opening_mps_min(3.0)).abs() < 1e-6 && climb.xy().norm() < 1e-9, "{climb}");
     }
 
     /// In a crowd that leaves a way: everybody's distance is kept, and of thousands of velocities that keep it none is nearer to

@@ -12,8 +12,8 @@ pub fn flies(message: &MavMessage) -> Option<&'static str> {
     match message {
         MavMessage::SET_POSITION_TARGET_LOCAL_NED(_) | MavMessage::SET_POSITION_TARGET_GLOBAL_INT(_) => Some("sends targets"),
         MavMessage::SET_ATTITUDE_TARGET(_) => Some("sends attitudes"),
-        MavMessage::COMMAND_LONG(data) => by_command(data.command),
-        MavMessage::COMMAND_INT(data) => by_command(data.command),
+        MavMessage::COMMAND_LONG(data) => by_command(data.command, data.param1),
+        MavMessage::COMMAND_INT(data) => by_command(data.command, data.param1),
         // 2: fly there now; 3: change height.
         MavMessage::MISSION_ITEM(data) if matches!(data.current, 2 | 3) => Some("sends it to a point"),
         MavMessage::MISSION_ITEM_INT(data) if matches!(data.current, 2 | 3) => Some("sends it to a point"),
@@ -21,14 +21,15 @@ pub fn flies(message: &MavMessage) -> Option<&'static str> {
     }
 }
 
-fn by_command(command: MavCmd) -> Option<&'static str> {
+fn by_command(command: MavCmd, param1: f32) -> Option<&'static str> {
     match command {
         MavCmd::MAV_CMD_DO_REPOSITION => Some("sends it to a point"),
         MavCmd::MAV_CMD_NAV_TAKEOFF => Some("has it take off"),
         MavCmd::MAV_CMD_CONDITION_YAW => Some("turns it"),
         MavCmd::MAV_CMD_DO_CHANGE_SPEED => Some("changes its speed"),
         MavCmd::MAV_CMD_DO_ORBIT => Some("has it circle"),
-        MavCmd::MAV_CMD_DO_PAUSE_CONTINUE => Some("pauses it"),
+        // 1: go on, as it does.
+        MavCmd::MAV_CMD_DO_PAUSE_CONTINUE if param1 != 1.0 => Some("pauses it"),
         _ => None,
     }
 }
@@ -43,6 +44,11 @@ mod tests {
         MavMessage::COMMAND_LONG(ardu::COMMAND_LONG_DATA { command, ..Default::default() })
     }
 
+    fn pause(param1: f32) -> MavMessage {
+        let command = MavCmd::MAV_CMD_DO_PAUSE_CONTINUE;
+        MavMessage::COMMAND_LONG(ardu::COMMAND_LONG_DATA { command, param1, ..Default::default() })
+    }
+
     #[test]
     fn what_a_station_says_all_the_time_flies_nothing() {
         let chatter = [
@@ -53,6 +59,7 @@ mod tests {
             long(MavCmd::MAV_CMD_REQUEST_MESSAGE),
             long(MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL),
             long(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM),
+            pause(1.0),
         ];
         assert!(chatter.iter().all(|message| flies(message).is_none()));
     }
@@ -65,6 +72,7 @@ mod tests {
             MavMessage::MISSION_ITEM(ardu::MISSION_ITEM_DATA { current: 2, ..Default::default() }),
             MavMessage::COMMAND_INT(ardu::COMMAND_INT_DATA { command: MavCmd::MAV_CMD_DO_REPOSITION, ..Default::default() }),
             long(MavCmd::MAV_CMD_NAV_TAKEOFF),
+            pause(0.0),
         ];
         assert!(moves.iter().all(|message| flies(message).is_some()));
     }

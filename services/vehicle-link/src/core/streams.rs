@@ -46,7 +46,7 @@ const fn stream(message_id: u32, interval_us: u32, stall_s: f64) -> Stream {
 }
 
 /// What is asked for. Heartbeats come faster than the usual 1 Hz, since they tell that the pilot took over.
-pub const STREAMS: [Stream; 12] = [
+pub const STREAMS: [Stream; 13] = [
     stream(ardu::GLOBAL_POSITION_INT_DATA::ID, 100_000, 2.0),
     stream(ardu::ATTITUDE_QUATERNION_DATA::ID, 100_000, 2.0),
     // Where its local frame lies: setpoints with acceleration are taken only there.
@@ -57,6 +57,8 @@ pub const STREAMS: [Stream; 12] = [
     stream(ardu::EKF_STATUS_REPORT_DATA::ID, 500_000, 4.0),
     stream(ardu::ESTIMATOR_STATUS_DATA::ID, 500_000, 4.0),
     stream(ardu::GPS_RAW_INT_DATA::ID, 500_000, 4.0),
+    // Where there are two receivers.
+    stream(ardu::GPS2_RAW_DATA::ID, 500_000, 8.0),
     stream(ardu::BATTERY_STATUS_DATA::ID, 1_000_000, 8.0),
     stream(ardu::HOME_POSITION_DATA::ID, 1_000_000, 8.0),
     // Where there is a rangefinder.

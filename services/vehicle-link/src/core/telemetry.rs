@@ -5,7 +5,8 @@
 //! (`home_height_m`). The other choice, GNSS altitude above mean sea level less the origin's, is off by metres (GNSS is worse
 //! upwards than sideways, geoid models differ by decimetres, a lake isn't at sea level); the barometer and the estimator hold the
 //! relative one to decimetres over a flight, and a jetty's height is measured with a tape. The home that counts is the one it took
-//! off from: an autopilot whose home is set anew in flight counts its height from there, and that is made up for.
+//! off from: an autopilot whose home is set anew in flight, or where it is armed again after a landing elsewhere, counts its height from
+//! there. That shows in the same message, as a step between its two altitudes, and is made up for.
 //!
 //! # Ages
 //! Every part says how old it is. Health that is old, or dated ahead of now by a clock that was set back, is unknown.
@@ -32,12 +33,12 @@ const DISTANCE_SENSOR_S: f64 = 2.0;
 const SIGNAL_INVALID: u8 = 1;
 /// What is dated further ahead of now than this is not fresh, seconds.
 const AHEAD_S: f64 = 0.5;
-/// Home whose height changes in flight by more than this was set anew, metres; less is its own wander. By more than the greatest, it is an
-/// error.
-const HOME_MOVED_M: f64 = 2.0;
-const HOME_MOVED_M_MAX: f64 = 1000.0;
-/// The home that the autopilot sets when it arms may be heard so late, seconds after it left the ground.
-const HOME_LATE_S: f64 = 5.0;
+/// The autopilot's two altitudes come from one estimate: their difference, home's altitude, steps by more than this only when home is
+/// set anew, metres. By more than the greatest, it is an error.
+const HOME_STEP_M: f64 = 0.2;
+const HOME_STEP_M_MAX: f64 = 1000.0;
+/// Landed further from home than this, it is elsewhere, metres: receivers wander.
+const HOME_WITHIN_M: f64 = 20.0;
 /// The boot clock's offset to the fleet's is the least delay seen in the last one to two of these, seconds.
 const OFFSET_WINDOW_S: f64 = 10.0;
 
@@ -63,6 +64,12 @@ struct Position {
     stamp: Stamp,
 }
 
+impl Position {
+    fn home_amsl_m(&self) -> f64 {
+        self.geodetic.altitude_m - self.relative_altitude_m
+    }
+}
+
 /// Everything heard from one autopilot.
 #[derive(Debug, Clone)]
 pub struct Telemetry {
@@ -75,16 +82,19 @@ pub struct Telemetry {
     position: Option<Position>,
     attitude: Option<Aged<UnitQuaternion<f64>>>,
     home: Option<Aged<Geodetic>>,
-    /// Home when it left the ground.
+    /// Home when it last left the ground.
     home_of_flight: Option<Geodetic>,
-    off_the_ground_since: Option<Stamp>,
+    off_the_ground: bool,
+    /// By how much home is higher than the one that it took off from, metres.
+    home_rise_m: f64,
     motion: Differentiator,
     /// `None` within: out of its range.
     range: Option<Aged<Option<f64>>>,
     distance_sensor_heard: Option<Stamp>,
     landed: Option<Aged<LandedState>>,
     battery: Option<Aged<(Option<f64>, Option<f64>)>>,
-    fix: Option<Aged<Fix>>,
+    /// Of the first and the second receiver.
+    fixes: [Option<Aged<Fix>>; 2],
     estimator_ok: Option<Aged<bool>>,
     prearm_ok: Option<Aged<bool>>,
     heard: Option<Stamp>,
@@ -105,13 +115,14 @@ impl Telemetry {
             attitude: None,
             home: None,
             home_of_flight: None,
-            off_the_ground_since: None,
+            off_the_ground: false,
+            home_rise_m: 0.0,
             motion: Differentiator::default(),
             range: None,
             distance_sensor_heard: None,
             landed: None,
             battery: None,
-            fix: None,
+            fixes: [None; 2],
             estimator_ok: None,
             prearm_ok: None,
             heard: None,
@@ -130,7 +141,7 @@ impl Telemetry {
             }
             MavMessage::GLOBAL_POSITION_INT(data) => {
                 let stamp = self.boot.stamp(data.time_boot_ms, now);
-                self.position = position(data, stamp);
+                self.observe_position(position(data, stamp));
                 return true;
             }
             MavMessage::ATTITUDE_QUATERNION(data) => {
@@ -151,10 +162,6 @@ impl Telemetry {
             }
             MavMessage::HOME_POSITION(data) => {
                 self.home = geodetic(data.latitude, data.longitude, data.altitude).map(|home| Aged(home, now));
-                let late = self.off_the_ground_since.is_none_or(|since| now.seconds_since(since) <= HOME_LATE_S);
-                if self.home_of_flight.is_none() || late {
-                    self.home_of_flight = self.home.map(|home| home.0);
-                }
             }
             MavMessage::LOCAL_POSITION_NED(data) => self.motion.observe(data, now),
             MavMessage::DISTANCE_SENSOR(data)
@@ -174,20 +181,20 @@ impl Telemetry {
             }
             MavMessage::EXTENDED_SYS_STATE(data) => {
                 self.landed = Some(Aged(landed(data.landed_state), now));
-                self.off_the_ground_since = self.off_the_ground().then(|| self.off_the_ground_since.unwrap_or(now));
+                let armed = self.heartbeat.is_some_and(|heartbeat| heartbeat.0.1);
+                let is_up = !matches!(landed(data.landed_state), LandedState::OnGround | LandedState::Unknown);
+                let was_off = std::mem::replace(&mut self.off_the_ground, armed && is_up);
+                if self.off_the_ground && !was_off {
+                    self.home_of_flight = self.home.map(|home| home.0);
+                }
             }
             MavMessage::SYS_STATUS(data) => self.observe_sys_status(data, now),
             MavMessage::BATTERY_STATUS(data) if data.id == 0 => self.observe_battery(data, now),
             MavMessage::GPS_RAW_INT(data) => {
-                self.fix = Some(Aged(
-                    Fix {
-                        // Kinds beyond 6 (static, PPP) are at least three-dimensional.
-                        kind: (data.fix_type as u32).min(6),
-                        satellites: if data.satellites_visible == u8::MAX { 0 } else { data.satellites_visible.into() },
-                        horizontal_sigma_m: (data.h_acc != 0).then(|| f64::from(data.h_acc) * 1e-3),
-                    },
-                    now,
-                ));
+                self.fixes[0] = Some(Aged(fix(data.fix_type, data.satellites_visible, data.h_acc), now));
+            }
+            MavMessage::GPS2_RAW(data) => {
+                self.fixes[1] = Some(Aged(fix(data.fix_type, data.satellites_visible, data.h_acc), now));
             }
             MavMessage::EKF_STATUS_REPORT(data) => {
                 let need = Ekf::EKF_ATTITUDE
@@ -253,19 +260,28 @@ impl Telemetry {
         }
     }
 
-    /// Known to be in the air.
-    fn off_the_ground(&self) -> bool {
-        let armed = self.heartbeat.is_some_and(|heartbeat| heartbeat.0.1);
-        armed && self.landed.is_some_and(|landed| matches!(landed.0, LandedState::InAir | LandedState::Landing))
+    fn observe_position(&mut self, position: Option<Position>) {
+        let rise_m = self.position.zip(position).map_or(0.0, |(before, now)| now.home_amsl_m() - before.home_amsl_m());
+        if (HOME_STEP_M..=HOME_STEP_M_MAX).contains(&rise_m.abs()) {
+            // At home it is where the vehicle stands again, without the barometer's drift.
+            let elsewhere = self.off_the_ground || position.is_some_and(|position| self.is_away(&position));
+            self.home_rise_m = if elsewhere { self.home_rise_m + rise_m } else { 0.0 };
+        }
+        if rise_m.abs() <= HOME_STEP_M_MAX {
+            self.position = position;
+        }
     }
 
-    /// What the autopilot's relative altitude lacks because its home was set anew in flight, metres. What is sent to it is short of that,
-    /// too.
+    /// Whether it has flown, and is not where it took off.
+    fn is_away(&self, position: &Position) -> bool {
+        let ned_m = |place| self.frame.ned_from_geodetic(place);
+        self.home_of_flight.is_some_and(|home| (ned_m(home) - ned_m(position.geodetic)).xy().norm() > HOME_WITHIN_M)
+    }
+
+    /// What the autopilot's relative altitude lacks because its home was set anew, metres. What is sent to it is short of that, too.
     #[must_use]
     pub fn home_rise_m(&self) -> f64 {
-        let off_the_ground = self.off_the_ground_since.is_some();
-        let rise_m = self.home.zip(self.home_of_flight).map_or(0.0, |(home, flight)| home.0.altitude_m - flight.altitude_m);
-        if off_the_ground && (HOME_MOVED_M..=HOME_MOVED_M_MAX).contains(&rise_m.abs()) { rise_m } else { 0.0 }
+        self.home_rise_m
     }
 
     /// When the autopilot was last heard.
@@ -295,7 +311,7 @@ impl Telemetry {
     /// Altitude of home above mean sea level, metres, by the autopilot's two altitudes.
     #[must_use]
     pub fn home_amsl_m(&self) -> Option<f64> {
-        self.position.map(|position| position.geodetic.altitude_m - position.relative_altitude_m)
+        self.position.map(|position| position.home_amsl_m())
     }
 
     /// What is still missing before there is a state, for people.
@@ -309,19 +325,31 @@ impl Telemetry {
         }
     }
 
+    /// The better of the receivers' fixes, if any is fresh; else the newest. With either the autopilot may fly: whether it can, its
+    /// estimator says.
+    fn best_fix(&self, now: Stamp) -> Option<Aged<Fix>> {
+        let is_fresh = |aged: &Aged<Fix>| Aged::fresh(Some(*aged), now, HEALTH_AGE_S).is_some();
+        let sigma_m = |aged: &Aged<Fix>| aged.0.horizontal_sigma_m.unwrap_or(f64::INFINITY);
+        let fixes = self.fixes.iter().rev().flatten().copied();
+        let best =
+            fixes.clone().filter(is_fresh).max_by(|a, b| a.0.kind.cmp(&b.0.kind).then(sigma_m(b).total_cmp(&sigma_m(a))));
+        best.or_else(|| fixes.max_by_key(|aged| aged.1))
+    }
+
     /// The state at `now`; `None` until mode, position and attitude have been heard. Activity, plan, touchdown and payload are the
     /// executor's to fill in.
     #[must_use]
     pub fn state(&self, now: Stamp) -> Option<VehicleState> {
         let (position, attitude) = (self.position?, self.attitude?.0);
         let (mode, armed) = self.heartbeat?.0;
-        let height_m = position.relative_altitude_m + self.home_height_m + self.home_rise_m();
+        let height_m = position.relative_altitude_m + self.home_height_m + self.home_rise_m;
         // North and east from the map, down from the height above water: see the module's documentation.
         let at_height = Geodetic { altitude_m: self.frame.origin().altitude_m + height_m, ..position.geodetic };
         let mut position_ned_m = self.frame.ned_from_geodetic(at_height);
         position_ned_m.z = -height_m;
         let (battery_fraction, battery_v) = Aged::fresh(self.battery, now, BATTERY_AGE_S).unwrap_or_default();
-        let fix = Aged::fresh(self.fix, now, HEALTH_AGE_S);
+        let aged_fix = self.best_fix(now);
+        let fix = Aged::fresh(aged_fix, now, HEALTH_AGE_S);
         let estimator_ok = Aged::fresh(self.estimator_ok, now, HEALTH_AGE_S).unwrap_or(false);
         let ready_to_arm = Aged::fresh(self.prearm_ok, now, HEALTH_AGE_S).unwrap_or(false);
         Some(VehicleState {
@@ -357,7 +385,7 @@ impl Telemetry {
                 attitude_s: Aged::age_s(self.attitude, now),
                 landed_s: Aged::age_s(self.landed, now),
                 battery_s: Aged::age_s(self.battery, now),
-                fix_s: Aged::age_s(self.fix, now),
+                fix_s: Aged::age_s(aged_fix, now),
                 estimator_s: Aged::age_s(self.estimator_ok, now),
                 home_s: Aged::age_s(self.home, now),
             },
@@ -375,6 +403,15 @@ fn position(data: &ardu::GLOBAL_POSITION_INT_DATA, stamp: Stamp) -> Option<Posit
         velocity_ned_mps: Vector3::new(data.vx.into(), data.vy.into(), data.vz.into()) * 1e-2,
         stamp,
     })
+}
+
+fn fix(kind: ardu::GpsFixType, satellites_visible: u8, sigma_mm: u32) -> Fix {
+    Fix {
+        // Kinds beyond 6 (static, PPP) are at least three-dimensional.
+        kind: (kind as u32).min(6),
+        satellites: if satellites_visible == u8::MAX { 0 } else { satellites_visible.into() },
+        horizontal_sigma_m: (sigma_mm != 0).then(|| f64::from(sigma_mm) * 1e-3),
+    }
 }
 
 /// From MAVLink's 1e-7 degrees and millimetres; (0, 0) is how autopilots say that they don't know.
@@ -580,42 +617,75 @@ mod tests {
         assert_eq!(telemetry.state(t(1.2)).unwrap().range, None);
     }
 
+    /// The first receiver loses its fix, or falls silent: the second has one, and the estimator is content.
+    #[test]
+    fn the_better_of_two_receivers_counts() {
+        use ardu::GpsFixType as Kind;
+        let first = |fix_type, h_acc| MavMessage::GPS_RAW_INT(ardu::GPS_RAW_INT_DATA { fix_type, h_acc, ..Default::default() });
+        let second = |fix_type, h_acc| MavMessage::GPS2_RAW(ardu::GPS2_RAW_DATA { fix_type, h_acc, ..Default::default() });
+        let kind_and_sigma = |telemetry: &Telemetry, s: f64| {
+            let state = telemetry.state(t(s)).unwrap();
+            state.fix.map(|fix| (fix.kind, fix.horizontal_sigma_m, state.ages.fix_s.unwrap()))
+        };
+        let mut telemetry = telemetry(0.0);
+        basics(&mut telemetry, t(0.0));
+        telemetry.observe(&first(Kind::GPS_FIX_TYPE_3D_FIX, 900), t(1.0));
+        telemetry.observe(&second(Kind::GPS_FIX_TYPE_3D_FIX, 400), t(1.5));
+        assert_eq!(kind_and_sigma(&telemetry, 2.0), Some((3, Some(0.4), 0.5)));
+        telemetry.observe(&first(Kind::GPS_FIX_TYPE_RTK_FIXED, 20), t(2.0));
+        assert_eq!(kind_and_sigma(&telemetry, 2.0), Some((6, Some(0.02), 0.0)));
+        telemetry.observe(&first(Kind::GPS_FIX_TYPE_NO_FIX, 0), t(3.0));
+        assert_eq!(kind_and_sigma(&telemetry, 3.0), Some((3, Some(0.4), 1.5)));
+        telemetry.observe(&second(Kind::GPS_FIX_TYPE_NO_GPS, 0), t(4.0));
+        assert_eq!(kind_and_sigma(&telemetry, 4.0).unwrap().0, 1);
+        telemetry.observe(&second(Kind::GPS_FIX_TYPE_3D_FIX, 400), t(5.0));
+        assert_eq!(kind_and_sigma(&telemetry, 9.0).unwrap().0, 3);
+        assert_eq!(kind_and_sigma(&telemetry, 11.0), None, "both are old");
+    }
+
     #[test]
     fn a_home_set_anew_in_flight_does_not_move_the_height() {
         let mut telemetry = telemetry(1.5);
         basics(&mut telemetry, t(0.0));
         let home = |altitude_m: f64| {
-            let data = ardu::HOME_POSITION_DATA {
-                latitude: 450_000_000,
-                longitude: 70_000_000,
-                altitude: (altitude_m * 1e3) as i32,
-                ..Default::default()
-            };
-            MavMessage::HOME_POSITION(data)
+            let altitude = (altitude_m * 1e3) as i32;
+            let (latitude, longitude) = (450_010_000, 70_000_000);
+            MavMessage::HOME_POSITION(ardu::HOME_POSITION_DATA { latitude, longitude, altitude, ..Default::default() })
         };
         let landed =
             |landed_state| MavMessage::EXTENDED_SYS_STATE(ardu::EXTENDED_SYS_STATE_DATA { landed_state, ..Default::default() });
-        telemetry.observe(&landed(ardu::MavLandedState::MAV_LANDED_STATE_ON_GROUND), t(0.0));
-        // On the ground it wanders with the receiver, and counts anew each time.
-        telemetry.observe(&home(231.0), t(0.0));
-        telemetry.observe(&home(226.0), t(0.1));
-        telemetry.observe(&landed(ardu::MavLandedState::MAV_LANDED_STATE_IN_AIR), t(0.2));
-        assert_eq!(telemetry.state(t(0.3)).unwrap().position_ned_m.z, -6.5);
-        // The one that it set when it armed, heard late, counts.
-        telemetry.observe(&home(223.0), t(1.0));
-        assert_eq!(telemetry.state(t(1.0)).unwrap().position_ned_m.z, -6.5);
-        telemetry.observe(&home(226.0), t(2.0));
-        // Set where it hovers, 5 m up: relative altitude 0.
-        telemetry.observe(&home(231.0), t(9.4));
-        let position = ardu::GLOBAL_POSITION_INT_DATA {
-            time_boot_ms: 50_400,
-            lat: 450_010_000,
-            lon: 70_000_000,
-            alt: 231_000,
-            ..Default::default()
+        // Where it stands, above sea level and above home.
+        let at = |telemetry: &mut Telemetry, lat: i32, amsl_m: f64, relative_m: f64, at_s: f64| {
+            let [alt, relative_alt] = [amsl_m, relative_m].map(|height_m| (height_m * 1e3).round() as i32);
+            let time_boot_ms = 50_000 + (at_s * 1e3) as u32;
+            let data =
+                ardu::GLOBAL_POSITION_INT_DATA { time_boot_ms, lat, lon: 70_000_000, alt, relative_alt, ..Default::default() };
+            telemetry.observe(&MavMessage::GLOBAL_POSITION_INT(data), t(at_s));
+            -telemetry.state(t(at_s)).unwrap().position_ned_m.z
         };
-        telemetry.observe(&MavMessage::GLOBAL_POSITION_INT(position), t(9.4));
-        assert_eq!(telemetry.state(t(9.5)).unwrap().position_ned_m.z, -6.5);
+        telemetry.observe(&landed(ardu::MavLandedState::MAV_LANDED_STATE_ON_GROUND), t(0.0));
+        telemetry.observe(&home(226.0), t(0.0));
+        // On the ground at home it counts anew each time.
+        let here = 450_010_000;
+        assert_eq!(at(&mut telemetry, here, 226.7, 0.7, 0.1), 2.2);
+        assert_eq!(at(&mut telemetry, here, 226.7, 0.0, 0.2), 1.5);
+        telemetry.observe(&landed(ardu::MavLandedState::MAV_LANDED_STATE_TAKEOFF), t(0.4));
+        assert_eq!(at(&mut telemetry, here, 228.7, 2.0, 1.0), 3.5);
+        // Set where it climbs, 3 m up, before HOME_POSITION says so; and again at 5 m; and what is a thousand kilometres is none.
+        assert_eq!(at(&mut telemetry, here, 229.7, 0.0, 1.1), 4.5);
+        telemetry.observe(&home(229.7), t(1.2));
+        telemetry.observe(&landed(ardu::MavLandedState::MAV_LANDED_STATE_IN_AIR), t(1.4));
+        assert_eq!(at(&mut telemetry, here, 231.7, 2.0, 2.0), 6.5);
+        assert_eq!(at(&mut telemetry, here, 231.7, 0.0, 9.0), 6.5);
+        assert_eq!(at(&mut telemetry, here, 231.7, -1e6, 9.1), 6.5);
+        // On the water 111 m from there, 1.5 m below home, it is armed again, and takes home there.
+        let water = 450_000_000;
+        assert_eq!(at(&mut telemetry, water, 225.2, -6.5, 20.0), 0.0);
+        telemetry.observe(&landed(ardu::MavLandedState::MAV_LANDED_STATE_ON_GROUND), t(20.0));
+        assert_eq!(at(&mut telemetry, water, 225.2, 0.0, 25.0), 0.0);
+        // Carried home and armed, it is at home.
+        assert!((at(&mut telemetry, here, 226.9, 1.7, 90.0) - 1.7).abs() < 1e-9);
+        assert_eq!(at(&mut telemetry, here, 226.9, 0.0, 90.1), 1.5);
     }
 
     /// Messages delayed by a queue are still dated when they were measured; a restarted autopilot starts the offset afresh.

@@ -282,16 +282,18 @@ impl Keeper {
         }
         let header = frame.header();
         let Ok(system) = u8::try_from(header.system_id) else { return false };
+        let message = frame.message();
         if header.component_id == AUTOPILOT_COMPONENT {
             if self.systems.len() < SYSTEMS_MAX || self.systems.contains_key(&system) {
                 self.systems.entry(system).or_default().observe(frame.version(), now);
             }
-            if !writer.learn(system, from, now) {
+            // The checksum of a message that is not known here is not known, either.
+            if !writer.learn(system, from, message.is_some(), now) {
                 metrics::counter!("vehicle_link_frames_rejected_total", "reason" => "another_sender").increment(1);
                 return false;
             }
         }
-        let event = match frame.message() {
+        let event = match message {
             Some(message) => LinkEvent::Message(header, Box::new(message)),
             // Unknown messages and values of newer dialects: the frame was whole, the stream goes on.
             None => {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::io;
-use std::net::SocketAddr;
+use std::net::{IpAddr, SocketAddr};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -33,7 +33,8 @@ pub(super) struct Reader {
 
 enum Source {
     Stream(Box<dyn AsyncRead + Send + Unpin>, Framer),
-    Datagrams(Arc<UdpSocket>),
+    /// From everybody, or from one host only.
+    Datagrams(Arc<UdpSocket>, Option<IpAddr>),
 }
 
 /// Where frames go.
@@ -80,6 +81,11 @@ impl Places {
         true
     }
 
+    /// Whether the system speaks from there, as far as is known.
+    fn is_from(&self, system: u8, from: SocketAddr) -> bool {
+        self.by_system.get(&system).is_some_and(|(place, _)| *place == from)
+    }
+
     fn of(&self, to: To) -> Vec<SocketAddr> {
         match to {
             To::System(system) => self.by_system.get(&system).map(|place| place.0).or(self.last).into_iter().collect(),
@@ -110,8 +116,12 @@ impl Reader {
                 self.unframed_bytes = if frames.is_empty() { self.unframed_bytes.saturating_add(length) } else { 0 };
                 Ok((frames, None))
             }
-            Source::Datagrams(socket) => {
+            Source::Datagrams(socket, host) => {
                 let (length, from) = socket.recv_from(&mut self.buffer).await?;
+                if host.is_some_and(|host| from.ip().to_canonical() != host) {
+                    metrics::counter!("vehicle_link_frames_rejected_total", "reason" => "another_sender").increment(1);
+                    return Ok((Vec::new(), Some(from)));
+                }
                 Ok((Framer::datagram(self.buffer.get(..length).unwrap_or_default()), Some(from)))
             }
         }
@@ -143,10 +153,12 @@ impl Writer {
         }
     }
 
-    /// A believable frame of `system` came from there; whether it speaks from there.
-    pub(super) fn learn(&mut self, system: u8, from: Option<SocketAddr>, now: Stamp) -> bool {
+    /// A frame of `system` came from there; whether it speaks from there. Only one that is `sound`, with a checksum that was right, teaches its
+    /// place.
+    pub(super) fn learn(&mut self, system: u8, from: Option<SocketAddr>, sound: bool, now: Stamp) -> bool {
         match (self, from) {
-            (Self::Datagrams { places, .. }, Some(from)) => places.learn(system, from, now),
+            (Self::Datagrams { places, .. }, Some(from)) if sound => places.learn(system, from, now),
+            (Self::Datagrams { places, .. }, Some(from)) => places.is_from(system, from),
             _ => true,
         }
     }
@@ -166,8 +178,16 @@ pub(super) fn tcp(connection: TcpStream) -> io::Result<(Reader, Writer)> {
 
 fn datagrams(socket: UdpSocket, fixed: Option<SocketAddr>) -> (Reader, Writer) {
     let socket = Arc::new(socket);
-    let reader = Reader::new(Source::Datagrams(socket.clone()));
+    let reader = Reader::new(Source::Datagrams(socket.clone(), fixed.and_then(host)));
     (reader, Writer::Datagrams { socket, fixed, places: Places::default() })
+}
+
+/// Who answers from there: one host, from whatever port; `None` if it may be several.
+fn host(place: SocketAddr) -> Option<IpAddr> {
+    let ip = place.ip().to_canonical();
+    // A network's mask is not known here: 255 at the end may be everybody in it.
+    let is_many = ip.is_multicast() || matches!(ip, IpAddr::V4(ip) if ip.octets()[3] == 255);
+    (!is_many && !ip.is_unspecified()).then_some(ip)
 }
 
 /// Opens an endpoint. A listener waits for its caller as long as that takes; the others must succeed soon.
@@ -218,6 +238,35 @@ mod tests {
     use super::*;
 
     #[test]
+    fn one_host_answers_or_any_of_a_network() {
+        let host = |place: &str| host(place.parse().unwrap()).map(|ip| ip.to_string());
+        assert_eq!(host("10.0.0.7:14550").as_deref(), Some("10.0.0.7"));
+        assert_eq!(host("[::ffff:10.0.0.7]:14550").as_deref(), Some("10.0.0.7"));
+        for many in ["10.0.0.255:14550", "255.255.255.255:14550", "239.1.2.3:14550", "[ff02::1]:14550", "0.0.0.0:14550"] {
+            assert_eq!(host(many), None, "{many}");
+        }
+    }
+
+    /// A stranger speaks to the socket from which one autopilot is flown: what it says is not heard.
+    #[tokio::test]
+    async fn a_stranger_is_not_heard_where_the_place_is_fixed() {
+        let vehicle = UdpSocket::bind("127.0.0.1:0").await.unwrap();
+        let stranger = UdpSocket::bind("127.0.0.2:0").await.unwrap();
+        let place = vehicle.local_addr().unwrap();
+        let (mut reader, mut writer) = datagrams(any_port(place).await.unwrap(), Some(place));
+        writer.send(b"hello", To::All).await.unwrap();
+        let mut buffer = [0; 16];
+        let (_, ours) = vehicle.recv_from(&mut buffer).await.unwrap();
+        let heartbeat = mavlink::dialects::ardupilotmega::HEARTBEAT_DATA::default();
+        let message = mavlink::dialects::ardupilotmega::MavMessage::HEARTBEAT(heartbeat);
+        let frame = Frame::encode(mavlink::MavlinkVersion::V2, mavlink::MavHeader::default(), &message).unwrap();
+        stranger.send_to(frame.bytes(), ours).await.unwrap();
+        vehicle.send_to(frame.bytes(), ours).await.unwrap();
+        assert!(reader.frames().await.unwrap().0.is_empty());
+        assert_eq!(reader.frames().await.unwrap().0.len(), 1);
+    }
+
+    #[test]
     fn each_vehicle_on_a_socket_is_answered_where_it_spoke() {
         let place = |port| SocketAddr::from(([127, 0, 0, 1], port));
         let mut places = Places::default();
@@ -232,6 +281,7 @@ mod tests {
         assert_eq!(places.of(To::System(7)), [place(1007)]);
         assert!(places.learn(7, place(6666), t(3.1)));
         assert_eq!(places.of(To::System(7)), [place(6666)]);
+        assert!(places.is_from(7, place(6666)) && !places.is_from(7, place(1007)) && !places.is_from(9, place(6666)));
         for system in 0..=255 {
             places.learn(system, place(2000), t(10.0));
         }

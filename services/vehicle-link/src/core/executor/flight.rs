@@ -14,7 +14,8 @@ use crate::core::separation;
 
 /// The autopilot's own climb is waited for so long, seconds; then guidance takes over.
 const CLIMB_S_MAX: f64 = 30.0;
-/// And ends when the vehicle is up and climbs no faster than this, metres per second.
+/// And ends when the vehicle is up, within so much, and climbs no faster than this, or goes on climbing: metres, metres per second.
+const ARRIVED_M: f64 = 0.5;
 const CLIMBED_MPS: f64 = 0.5;
 /// Nearer than this to its place a vehicle may go to the place's own height, and counts as there, metres.
 const NEAR_M: f64 = 3.0;
@@ -58,8 +59,8 @@ impl Executor {
         let family = Family::named(own.firmware.as_ref());
         let goal = match goal {
             Some(goal) => goal,
-            // Without setpoints it wouldn't stay.
-            None if family == Family::Px4 && own.mode == FlightMode::Guided => Goal::Stay,
+            // Without setpoints PX4 wouldn't stay; and whatever flies by our targets flies on by the last one.
+            None if own.mode == FlightMode::Guided && (family == Family::Px4 || self.reference.is_some()) => Goal::Stay,
             None if self.plan_health(now) == PlanHealth::Lapsed => Goal::Stay,
             None if self.restarted_at.is_some() => {
                 return self.set(Activity::Holding { settled: false }, "restarted in flight, waiting for a plan");
@@ -73,9 +74,9 @@ impl Executor {
         let land_now = alarm.as_ref().is_some_and(|alarm| alarm.action == Action::Land);
         if let Some(climb) = self.climb.filter(|_| own.mode == family.climbs_in() && !land_now) {
             // PX4 says by its mode that it has arrived.
-            let arrived = own.mode == FlightMode::Guided
-                && -here_ned_m.z >= climb.height_m - 0.5
-                && own.velocity_ned_mps.z.abs() < CLIMBED_MPS;
+            let short_m = climb.height_m + here_ned_m.z;
+            let is_up = (short_m <= ARRIVED_M && own.velocity_ned_mps.z.abs() < CLIMBED_MPS) || short_m <= 0.0;
+            let arrived = own.mode == FlightMode::Guided && is_up;
             if !arrived && now.seconds_since(climb.since) < CLIMB_S_MAX {
                 // A setpoint now would end the autopilot's own take-off.
                 return self.set(Activity::TakingOff, format!("to {:.1} m", climb.height_m));
@@ -107,8 +108,11 @@ impl Executor {
         let mut step = Step { own, here_ned_m, dt_s, now, outputs };
         match own.mode {
             // Whatever else is the matter, a place that has jumped is not flown by.
-            FlightMode::Guided if self.has_jumped() && alarm.is_some() && !land_now => {
+            FlightMode::Guided if self.has_jumped() && alarm.is_some() => {
                 self.ride_out(&mut step);
+                if land_now {
+                    self.land_here(&mut step);
+                }
             }
             FlightMode::Guided => self.guide(&effective, &mut step),
             FlightMode::Land => self.in_land_mode(&effective, &mut step),

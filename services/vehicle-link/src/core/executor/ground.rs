@@ -2,7 +2,7 @@
 
 use halcyon_model::{Activity, FlightMode, LandedState, LocalPoint, Severity, Stamp, VehicleState};
 
-use super::{Climb, Executor, Goal, Output};
+use super::{Climb, Executor, Goal, Home, Output};
 use crate::core::commands::Command;
 use crate::core::failsafe::{FailSafes, PlanHealth};
 use crate::core::interlock;
@@ -14,21 +14,32 @@ use crate::core::px4::TakeOff;
 const LANDED_WITHIN_M: f64 = 5.0;
 /// Nearer than this to home, it is there: receivers wander by metres.
 const HOME_WITHIN_M: f64 = 20.0;
+/// A barometer drifts by no more than this in a flight, metres.
+const DRIFT_M_MAX: f64 = 5.0;
 /// The take-off height is at least this much above the ground that it stands on, metres.
 const CLIMB_M_MIN: f64 = 2.5;
 
 impl Executor {
     /// It was in the air and is not any more.
     pub(super) fn touched_down(&mut self) {
-        if let (Some(Goal::Land { .. }), Some(own)) = (&self.active, &self.own)
+        if let (Some(Goal::Land { point, .. }), Some(own)) = (&self.active, &self.own)
             && !self.control.hands_off()
-            // Motors cut in the air, and a fail-safe's landing without a clearance, are no landing of the task's.
+            // A fail-safe's landing without a clearance is no landing of the task's.
             && !matches!(self.activity, Activity::FailSafe { .. })
-            && -own.state.position_ned_m.z <= self.config.limits.land_mode_height_m + 1.0
         {
-            self.touchdown = Some(LocalPoint::from(own.state.position_ned_m));
+            // Nor are motors cut in the air. In LAND over its place, where the autopilot finds the ground, its height may have drifted.
+            let here = LocalPoint::from(own.state.position_ned_m);
+            let over_it = here.distance_m(point) <= 3.0 * self.config.limits.landing_radius_m;
+            let lands = over_it && self.control.is_ours(FlightMode::Land);
+            let height_m_max = self.config.limits.land_mode_height_m + if lands { DRIFT_M_MAX } else { 1.0 };
+            if -own.state.position_ned_m.z <= height_m_max {
+                self.touchdown = Some(here);
+            }
         }
         self.landed_for_goal = true;
+        if self.home == Home::Declined {
+            self.home = Home::Loose;
+        }
         self.restarted_at = None;
         self.take_off = TakeOff::default();
         self.fail_safes = FailSafes::default();
@@ -70,7 +81,7 @@ impl Executor {
                 self.request(Command::SetMode(mode), now, outputs);
                 self.set(Activity::Preparing, format!("setting {}", interlock::mode_name(mode)));
             }
-            None if !own.armed && !self.home_fixed && self.is_home(own) => {
+            None if !own.armed && self.home == Home::Loose && self.is_home(own) => {
                 self.request(Command::SetHome, now, outputs);
                 self.set(Activity::Preparing, "fixing home here");
             }
@@ -81,7 +92,8 @@ impl Executor {
             None => {
                 let ground_m = -own.position_ned_m.z;
                 let height_m = self.config.limits.safe_height_m.max(ground_m + CLIMB_M_MIN);
-                let height_above_home_m = height_m - self.config.home_height_m;
+                // ArduCopter with a rangefinder counts from what is below instead. Too high is ended as soon as it is high enough.
+                let height_above_home_m = height_m - self.config.home_height_m.min(ground_m);
                 let before = outputs.len();
                 self.request(Command::TakeOff { height_above_home_m }, now, outputs);
                 if outputs.len() > before && Family::named(own.firmware.as_ref()) == Family::Px4 {
@@ -95,23 +107,25 @@ impl Executor {
         }
     }
 
-    /// Whether somebody else stopped the motors that we had started to take off with: in a mode of ours, and not at our request.
+    /// Whether somebody else, or a crash, stopped the motors that we had started: before a take-off, or in the air in GUIDED, but for a
+    /// descent, that may end on the water. Not at our request.
     pub(super) fn stopped_by_others(&self, state: &VehicleState) -> bool {
         let were_on = self.own.as_ref().is_some_and(|own| own.state.armed);
         let asked =
             self.pending.as_ref().is_some_and(|pending| matches!(pending.command, Command::Disarm { .. }) && !pending.failed);
-        let to_fly = matches!(self.activity, Activity::Preparing | Activity::TakingOff);
-        were_on && !state.armed && !self.airborne && to_fly && !asked && self.may_take_off_in(state)
+        let to_fly = matches!(self.activity, Activity::Preparing | Activity::TakingOff) && self.may_take_off_in(state);
+        let flies = self.control.is_ours(FlightMode::Guided) && state.mode == FlightMode::Guided && !self.descending;
+        were_on && !state.armed && !asked && if self.airborne { flies } else { to_fly }
     }
 
     /// Hands off until GUIDED is set: starting the motors again would be a fight with whoever stopped them, who may stand beside them.
-    pub(super) fn stands_down(&mut self) {
+    pub(super) fn stands_down(&mut self, what: &str) {
         self.control.let_go();
         self.withdraw = true;
         self.pending = None;
         self.take_off = TakeOff::default();
         self.flown = self.goal();
-        self.note(Severity::Warning, "the motors were stopped, not by us", "it does not take off until GUIDED is set");
+        self.note(Severity::Warning, what, "it does not take off until GUIDED is set");
     }
 
     /// Whether it may be armed and told to take off in its present mode. PX4's HOLD is anybody's: only once we have asked for it, it is

@@ -154,6 +154,16 @@ struct Climb {
     since: Stamp,
 }
 
+/// Whether the autopilot's home is fixed where it first took off, since it started last.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum Home {
+    #[default]
+    Loose,
+    Fixed,
+    /// It would not, for this take-off.
+    Declined,
+}
+
 /// One vehicle's executor.
 #[derive(Debug)]
 pub struct Executor {
@@ -210,8 +220,9 @@ pub struct Executor {
     landing: Landing,
     notes: Vec<Note>,
     withdraw: bool,
-    /// Home was fixed where it first took off, or the autopilot would not; since it started last.
-    home_fixed: bool,
+    home: Home,
+    /// A person wants the motors stopped, whatever it does.
+    terminated: bool,
     ask_streams: bool,
 }
 
@@ -261,7 +272,8 @@ impl Executor {
             landing: Landing::default(),
             notes: Vec::new(),
             withdraw: false,
-            home_fixed: false,
+            home: Home::default(),
+            terminated: false,
             ask_streams: false,
         }
     }
@@ -348,6 +360,10 @@ impl Executor {
                 self.take_off = px4::TakeOff::default();
                 // Once the pilot had it, it doesn't take off by itself for the same task again.
                 self.flown = self.goal();
+                // Its own flight from the ground, with nothing for us to do, ends with it; what was ours is given back by a person only.
+                if !first && (self.airborne || self.flown.as_ref().is_some_and(Goal::wants_flight)) {
+                    self.control.let_go();
+                }
                 let mode = mode_name(state.mode);
                 match self.autopilot_fail_safe(now) {
                     Some(words) => self.note(Severity::Critical, format!("the autopilot changed to {mode}"), words),
@@ -360,9 +376,14 @@ impl Executor {
                 }
                 self.note(Severity::Info, "the vehicle was handed back", mode_name(state.mode));
             }
+            Change::Over => self.note(Severity::Info, "the pilot's flight is over", mode_name(state.mode)),
         }
         if stopped {
-            self.stands_down();
+            self.stands_down("the motors were stopped, not by us");
+        }
+        if self.terminated && !state.armed {
+            self.terminated = false;
+            self.stands_down("the motors were stopped by a termination");
         }
         let was_airborne = self.airborne;
         self.airborne = is_airborne(&state);
@@ -416,8 +437,12 @@ impl Executor {
         }
         let declined = matches!(outcome, Err(CommandError::Refused { .. }));
         if *command == Command::SetHome {
-            // Refused, it is as without: the autopilot takes home where it is armed.
-            self.home_fixed |= outcome.is_ok() || declined;
+            match outcome {
+                Ok(()) => self.home = Home::Fixed,
+                // It is as without: the autopilot takes home where it is armed.
+                Err(_) if declined && self.home == Home::Loose => self.home = Home::Declined,
+                Err(_) => {}
+            }
         }
         if let (true, Err(error)) = (ours, outcome) {
             self.pending = Some(Pending { command: *command, at: now, failed: true, declined });

@@ -7,7 +7,7 @@ use halcyon_model::{Geodetic, LandedState, Severity, Stamp, VehicleId, VehicleSt
 use nalgebra::Vector3;
 
 use super::flight::{LOW_M, Step};
-use super::{Executor, Output};
+use super::{Executor, Home, Output};
 use crate::core::boot::{BootWatch, Finding};
 use crate::core::guidance::{Setpoint, limit_velocity};
 use crate::core::jump::JumpWatch;
@@ -182,7 +182,7 @@ impl Executor {
         self.withdraw = true;
         self.ask_streams = true;
         self.pending = None;
-        self.home_fixed = false;
+        self.home = Home::Loose;
         self.watch.position = JumpWatch::default();
         self.note(severity, what, "hands off until GUIDED is set");
     }

@@ -1,6 +1,6 @@
 //! Whole flights, nothing going wrong.
 
-use halcyon_model::{Activity, FlightMode, LocalPoint, Task};
+use halcyon_model::{Activity, FlightMode, LocalPoint, Task, VehicleAction};
 use nalgebra::Vector3;
 
 use super::world::{World, follow, land, survey};
@@ -165,12 +165,27 @@ fn a_vehicle_that_came_down_stays_down_until_its_task_changes() {
     let mut world = World::new(&[(0.0, 0.0)]);
     let plan = |world: &mut World| drop(world.plan(&[(0, survey(20.0, 0.0))], 5.0));
     world.until(90.0, plan, |world| settled(world, 0));
-    // The pilot lands it.
-    world.copters[0].mode = FlightMode::Land;
+    world.command(0, VehicleAction::Land);
     world.until(60.0, plan, |world| !world.copters[0].armed);
     world.run(30.0, |world| {
         plan(world);
         assert!(!world.copters[0].armed, "it took off again by itself");
     });
     world.until(30.0, |world| drop(world.plan(&[(0, survey(25.0, 0.0))], 5.0)), |world| world.copters[0].armed);
+}
+
+#[test]
+fn a_vehicle_that_the_pilot_brought_down_stays_down_until_guided_is_set() {
+    let mut world = World::new(&[(0.0, 0.0)]);
+    let plan = |world: &mut World| drop(world.plan(&[(0, survey(20.0, 0.0))], 5.0));
+    world.until(90.0, plan, |world| settled(world, 0));
+    world.copters[0].mode = FlightMode::Land;
+    world.until(60.0, plan, |world| !world.copters[0].armed);
+    let other = |world: &mut World| drop(world.plan(&[(0, survey(25.0, 0.0))], 5.0));
+    world.run(30.0, |world| {
+        other(world);
+        assert!(!world.copters[0].armed, "it took off with the pilot beside it");
+    });
+    world.command(0, VehicleAction::SetMode(FlightMode::Guided));
+    world.until(30.0, other, |world| world.copters[0].armed);
 }

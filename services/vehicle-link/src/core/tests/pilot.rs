@@ -145,3 +145,147 @@ fn the_dead_make_room_for_the_living() {
     executor.observe_neighbour(state("new", late), late);
     assert!(executor.knows(&id("new")));
 }
+
+/// The motors stop in the air, by a crash or by somebody's hand: whoever fishes it out is not to meet turning propellers, whatever the plan
+/// says next.
+#[test]
+fn motors_that_stopped_in_the_air_stay_off_until_guided_is_set() {
+    let cut: [fn(&mut World); 2] =
+        [|world| world.copters[0].armed = false, |world| drop(world.command(0, VehicleAction::Terminate))];
+    for stop in cut {
+        let mut world = World::new(&[(0.0, 0.0)]);
+        world.until(60.0, plan, |world| world.height(0) > 3.0);
+        stop(&mut world);
+        let other = |world: &mut World| drop(world.plan(&[(0, survey(80.0, 0.0))], 5.0));
+        world.run(30.0, |world| {
+            other(world);
+            assert!(!asked(world, Command::Arm));
+        });
+        assert!(matches!(world.activity(0), Activity::PilotControl), "{:?}", world.activity(0));
+        world.command(0, VehicleAction::SetMode(FlightMode::Guided));
+        world.until(60.0, other, |world| world.height(0) > 3.0);
+    }
+}
+
+/// A ground station flies it on the ground already, armed in GUIDED; then somebody stops the motors.
+#[test]
+fn a_station_that_took_it_on_the_ground_keeps_it_when_the_motors_stop() {
+    let mut world = armed_on_the_ground();
+    world.executors[0].observe_station("sends targets");
+    world.step();
+    world.copters[0].armed = false;
+    world.run(60.0, |world| {
+        plan(world);
+        assert!(!asked(world, Command::Arm) && !world.copters[0].armed, "started again");
+    });
+    assert!(matches!(world.activity(0), Activity::PilotControl), "{:?}", world.activity(0));
+}
+
+/// A command by a person ends with GUIDED, and there is no plan: the last target would be flown on at its velocity.
+#[test]
+fn with_nothing_more_to_do_it_holds_and_does_not_fly_on() {
+    let mut world = World::new(&[(0.0, 0.0)]);
+    world.step();
+    world.command(0, VehicleAction::TakeOff { height_m: 5.0 });
+    world.until(30.0, |_| {}, |world| world.height(0) > 4.0);
+    let point = halcyon_model::LocalPoint::new(100.0, 0.0);
+    world.command(0, VehicleAction::GoTo { point, height_m: 5.0 });
+    world.until(30.0, |_| {}, |world| world.copters[0].velocity.norm() > 2.5);
+    world.command(0, VehicleAction::SetMode(FlightMode::Guided));
+    let from = world.copters[0].position;
+    world.run(20.0, |world| assert!((world.copters[0].position - from).norm() < 8.0, "{}", world.copters[0].position));
+    assert!(world.copters[0].velocity.norm() < 0.1, "{}", world.copters[0].velocity);
+    assert!(matches!(world.activity(0), Activity::Holding { .. }), "{:?}", world.activity(0));
+}
+
+/// On the way down in LAND the estimator recovers and fails again: it is not flown up and down.
+#[test]
+fn a_landing_for_a_bad_estimator_is_not_broken_off_by_a_moment_of_good_news() {
+    let mut world = World::new(&[(0.0, 0.0)]);
+    world.airborne(0, Vector3::new(40.0, 0.0, -30.0));
+    world.run(2.0, plan);
+    world.copters[0].estimator_ok = false;
+    world.until(30.0, plan, |world| world.copters[0].mode == FlightMode::Land);
+    for moment in 0..40 {
+        world.copters[0].estimator_ok = moment % 2 == 0;
+        world.run(1.0, |world| {
+            plan(world);
+            assert_eq!(world.copters[0].mode, FlightMode::Land, "{moment}");
+        });
+    }
+    // Good for longer than a moment, it flies on.
+    world.copters[0].estimator_ok = true;
+    let for_s = world.until(30.0, plan, |world| world.copters[0].mode == FlightMode::Guided);
+    assert!((4.0..7.0).contains(&for_s), "{for_s}");
+}
+
+/// Its place has jumped when LAND is asked for, and the autopilot doesn't take LAND at once: no target leads to where it was to be held.
+#[test]
+fn before_land_is_in_force_a_place_that_jumped_is_not_flown_to() {
+    let mut world = World::new(&[(0.0, 0.0)]);
+    world.airborne(0, Vector3::new(40.0, 0.0, -5.0));
+    world.run(5.0, plan);
+    world.copters[0].estimator_ok = false;
+    world.copters[0].off = Vector3::new(12.0, 0.0, 0.0);
+    let mut asked_for = 0;
+    world.step();
+    world.run(30.0, |world| {
+        if asked(world, Command::SetMode(FlightMode::Land)) {
+            asked_for += 1;
+        }
+        plan(world);
+        world.copters[0].mode = FlightMode::Guided;
+        if let Some(setpoint) = world.setpoint(0) {
+            let believed = world.copters[0].position + world.copters[0].off;
+            assert!((setpoint.position_ned_m - believed).xy().norm() < 1.0, "{} {believed}", setpoint.position_ned_m);
+        }
+    });
+    assert!(asked_for > 0);
+}
+
+/// The autopilot refuses to stop the motors afloat, or doesn't answer: only a refusal, with both witnesses, lets them be stopped all the same.
+#[test]
+fn motors_are_cut_afloat_only_after_a_refusal() {
+    let afloat = |refuses: bool| {
+        let mut world = World::new(&[(0.0, 0.0)]);
+        world.airborne(0, Vector3::new(40.0, 0.0, -5.0));
+        world.copters[0].rangefinder = Some(0.0);
+        world.copters[0].finds_ground = false;
+        let cleared = |world: &mut World| {
+            let until = world.now.plus_secs_f64(5.0);
+            world.plan(&[(0, super::world::land(40.0, 0.0, Some(until)))], 5.0);
+        };
+        world.until(90.0, cleared, |world| world.copters[0].mode == FlightMode::Land && world.height(0) < 0.05);
+        let mut cut = false;
+        world.run(90.0, |world| {
+            cleared(world);
+            cut |= asked(world, Command::Disarm { force: true });
+            let gentle = Command::Disarm { force: false };
+            if !refuses && asked(world, gentle) {
+                let silence = Err(CommandError::TimedOut { tries: 4, percent: None });
+                let now = world.now;
+                world.executors[0].observe_outcome(&gentle, &silence, now);
+            }
+        });
+        cut
+    };
+    assert!(afloat(true) && !afloat(false));
+}
+
+/// Wherever it stands, the autopilot may count a take-off from home or, by its rangefinder, from what is below: it is high enough by both, and
+/// not taken higher than asked for.
+#[test]
+fn a_take_off_from_below_home_is_high_enough_by_either_count() {
+    let safe_m = crate::core::limits::Limits::default().safe_height_m;
+    for climbs_from_below in [false, true] {
+        let mut world = World::new(&[(0.0, 0.0)]);
+        world.executors[0] = Executor::new(crate::core::executor::ExecutorConfig { home_height_m: 4.0, ..config("v0") });
+        // On the water; home is on a jetty, 4 m up, and far away.
+        world.copters[0].home = Vector3::new(0.0, 300.0, -4.0);
+        world.copters[0].climbs_from_below = climbs_from_below;
+        let away = |world: &mut World| drop(world.plan(&[(0, survey(0.0, 40.0))], 5.0));
+        let took_s = world.until(20.0, away, |world| world.copters[0].position.y > 5.0);
+        assert!((safe_m - 0.7..safe_m + 2.7).contains(&world.height(0)), "{climbs_from_below}: {}", world.height(0));
+        assert!(took_s < 12.0, "{took_s}");
+    }
+}

@@ -53,6 +53,8 @@ pub(super) struct Copter {
     /// It notices when it has landed.
     pub(super) finds_ground: bool,
     pub(super) home: Vector3<f64>,
+    /// Takes off to a height above what is below it, as ArduCopter does with a rangefinder, and not above home.
+    pub(super) climbs_from_below: bool,
     surface_z: f64,
     climb_to: Option<f64>,
     setpoint: Option<Setpoint>,
@@ -79,7 +81,8 @@ impl Copter {
                 self.climb_to = None;
             }
             Command::TakeOff { height_above_home_m } if self.armed && self.mode == FlightMode::Guided => {
-                self.climb_to = Some(height_above_home_m - self.home.z);
+                let below_m = if self.climbs_from_below { -self.position.z } else { -self.home.z };
+                self.climb_to = Some(height_above_home_m + below_m);
             }
             Command::SetInterval(_) | Command::SetHome => {}
             Command::Payload(payload) => self.holds_payload = !payload.releases,
@@ -233,6 +236,7 @@ impl World {
             fence_m: f64::INFINITY,
             finds_ground: true,
             home: Vector3::new(home.0, home.1, 0.0),
+            climbs_from_below: false,
             surface_z: 0.0,
             climb_to: None,
             setpoint: None,
