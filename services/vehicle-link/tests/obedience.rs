@@ -55,7 +55,10 @@ impl Craft {
         let link = Autopilot::new(&config, origin, now).unwrap();
         let mut craft = Self { vehicle, link, executor, now, ticks: 0, notes: Vec::new(), positions: 0, slow: Vec::new() };
         craft.until(60.0, |craft| craft.state().is_some_and(|state| state.ready_to_arm && state.estimator_ok));
-        assert!(matches!(craft.command(VehicleAction::TakeOff { height_m: 6.0 }), Decision::Accepted(_)));
+        // The executor hears of it with the next position.
+        craft.run(0.1);
+        let decision = craft.command(VehicleAction::TakeOff { height_m: 6.0 });
+        assert!(matches!(decision, Decision::Accepted(_)), "{decision:?}");
         craft.until(60.0, |craft| matches!(craft.executor.activity(), Activity::Holding { settled: true }));
         craft
     }
