@@ -1,6 +1,7 @@
 //! What `halcyon waves` does: a file of readings in, every statistic of its waves out. No arguments are parsed and nothing is printed here.
 
 mod crests;
+mod lists;
 mod report;
 mod shape;
 mod survey;

@@ -374,3 +374,40 @@ fn the_published_record_has_its_published_waves() {
         }
     }
 }
+
+/// 0.1 m at 0.25 Hz for 400 s: every wave is in the list, 0.2 m high, 4 s long and 4 s after the one before; the lines' area is its variance,
+/// a²/2; a line's interval is chi-square's.
+#[test]
+fn the_json_lists_every_wave_and_every_line() {
+    let files = Files::new();
+    let sine = |t_s: f64| 0.1 * (TAU * 0.25 * t_s + 0.3).sin();
+    let report = waves(&options(files.put("sine.csv", table(4000, 10.0, sine)), None)).unwrap();
+    let json = serde_json::to_value(&report).unwrap();
+    let listed = json["waves"].as_array().unwrap();
+    assert_eq!(listed.len(), 99, "the first and the last are cut");
+    let number = |value: &serde_json::Value, name: &str| value[name].as_f64().unwrap();
+    for (i, wave) in listed.iter().enumerate() {
+        assert!((number(wave, "height_m") - 0.2).abs() < 1e-3 && (number(wave, "period_s") - 4.0).abs() < 1e-3, "{wave}");
+        assert!((number(wave, "crest_m") - 0.1).abs() < 1e-3 && (number(wave, "trough_m") + 0.1).abs() < 1e-3, "{wave}");
+        let start_s = 4.0 * (i as f64 + 1.0) - 0.3 / (TAU * 0.25);
+        assert!((number(wave, "start_s") - start_s).abs() < 1e-2, "{wave}, {start_s}");
+    }
+    let column = |name: &str| -> Vec<f64> {
+        json["density"][name].as_array().unwrap().iter().map(|value| value.as_f64().unwrap()).collect()
+    };
+    let (frequency_hz, density) = (column("frequency_hz"), column("density_m2_per_hz"));
+    assert_eq!(frequency_hz.len(), density.len());
+    let df_hz = frequency_hz[1] - frequency_hz[0];
+    assert!((df_hz - 1.0 / 64.0).abs() < 1e-9 && (frequency_hz.last().unwrap() - 5.0).abs() < 1e-9);
+    let variance_m2: f64 = density.iter().map(|line| line * df_hz).sum();
+    assert!((variance_m2 - 0.005).abs() < 5e-5, "{variance_m2}");
+    let peak = density.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1)).unwrap().0;
+    assert!((frequency_hz[peak] - 0.25).abs() < df_hz);
+    let shape = &json["shape"];
+    let (low, high) = (number(shape, "line_factor_low"), number(shape, "line_factor_high"));
+    // Wilson and Hilferty's cube, within a hundredth from five degrees on.
+    let dof = number(shape, "line_degrees_of_freedom");
+    let ninth = 2.0 / (9.0 * dof);
+    let bound = |z: f64| (1.0 - ninth + z * ninth.sqrt()).powi(-3);
+    assert!(dof > 5.0 && (low / bound(1.959_964) - 1.0).abs() < 0.01 && (high / bound(-1.959_964) - 1.0).abs() < 0.02, "{shape}");
+}

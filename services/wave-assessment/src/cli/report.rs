@@ -114,14 +114,14 @@ pub struct Burst {
     pub crest_statistics: Vec<CrestReport>,
     /// Every quality test.
     pub quality: Vec<FlagReport>,
-    /// The density spectrum, for plots.
-    #[serde(skip)]
+    /// The density spectrum, line by line; each line's 95 % interval is it times `shape.line_factor_low` to `shape.line_factor_high`.
+    #[serde(serialize_with = "super::lists::lines")]
     pub density: Option<SampledSpectrum>,
     /// The elevation without its trend, metres, for plots.
     #[serde(skip)]
     pub elevation_m: Vec<f64>,
-    /// The waves, for lists.
-    #[serde(skip)]
+    /// Every wave between rises through the trend.
+    #[serde(serialize_with = "super::lists::waves")]
     pub waves: Vec<Wave>,
 }
 

@@ -1,5 +1,6 @@
 //! What a spectrum says beyond its moments: peak, noise, wind sea and swell, and standard shapes fitted to it.
 
+use halcyon_ocean::confidence::variance_factors_95;
 use halcyon_ocean::interval::Interval;
 use halcyon_ocean::shape::{Estimate, JonswapFit, Kind, NoiseFloor, PeakPeriods, PiersonMoskowitzFit, Scatter, systems};
 use halcyon_ocean::{SampledSpectrum, Welch};
@@ -16,6 +17,10 @@ const SYSTEM_SHARE_MIN: f64 = 0.01;
 pub struct Shape {
     /// Degrees of freedom of one density: its 95 % interval is chi-square's.
     pub line_degrees_of_freedom: f64,
+    /// Its lower bound as a multiple of the density.
+    pub line_factor_low: f64,
+    /// Its upper bound.
+    pub line_factor_high: f64,
     /// Peak period by the parabola through the three highest densities, seconds.
     pub t_p_parabola_s: f64,
     /// ∫ S⁴ df/∫ f S⁴ df (Young 1995), seconds.
@@ -125,8 +130,11 @@ impl Shape {
             Kind::WindSea => "wind sea",
             Kind::Swell => "swell",
         };
+        let (line_factor_low, line_factor_high) = variance_factors_95(scatter.line_dof());
         Some(Self {
             line_degrees_of_freedom: scatter.line_dof(),
+            line_factor_low,
+            line_factor_high,
             t_p_parabola_s: peak.parabola_s,
             t_p_young_s: peak.young_s,
             t_pc_s: peak.moments_s,
