@@ -185,6 +185,11 @@ impl<'a> Service<'a> {
                     self.executor.observe_station(what);
                 }
             }
+            LinkEvent::StationGuided(system) => {
+                if self.autopilot.is_system(system) {
+                    self.executor.observe_station_guided(self.context.clock.now());
+                }
+            }
             LinkEvent::Unread(header, answer) => {
                 let now = self.context.clock.now();
                 if self.autopilot.observe_unread(header, answer.as_deref(), now) {

@@ -152,6 +152,13 @@ impl FailSafes {
         self.outside = false;
     }
 
+    /// Somebody else flies: what was begun for a bad estimator is over, and what is bad counts from when it is handed back.
+    pub fn released(&mut self) {
+        self.landing = None;
+        self.estimator_bad = Lasting::default();
+        self.jumped = Lasting::default();
+    }
+
     /// The charge that the way home needs, reserve included, as a fraction.
     fn fraction_home(&self, home_s: f64, limits: &FailSafeLimits) -> f64 {
         let rate_hz = self.consumption.rate_hz(limits.battery_endurance_s);

@@ -101,8 +101,8 @@ pub fn onward(track: &Track, own_follows: bool, limits: &Limits, now: Stamp) -> 
     Some(Obstacle { position_ned_m, velocity_ned_mps, keep_m, ..stopped })
 }
 
-/// An obstacle whose direction has no more than this of the horizontal, as a fraction, is right above: within 11.5°.
-const STEEP: f64 = 0.2;
+/// A vehicle is below another within 45° of the vertical.
+const BELOW: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// Least opening speed (negative: greatest closing speed) at a gap to the kept distance, metres per second.
 fn opening_mps_min(gap_m: f64) -> f64 {
@@ -123,18 +123,25 @@ struct Constraint {
     give: f64,
 }
 
-/// What `obstacle` forbids at that point: one half-space, or two.
-fn constraints(point_ned_m: Vector3<f64>, obstacle: &Obstacle) -> impl Iterator<Item = Constraint> {
+/// The level direction from `obstacle` to a point, north if there is none.
+fn side(point_ned_m: Vector3<f64>, obstacle: &Obstacle) -> Vector3<f64> {
+    let away_m = point_ned_m - obstacle.position_ned_m;
+    let level_m = Vector3::new(away_m.x, away_m.y, 0.0);
+    level_m.try_normalize(1e-6).unwrap_or(Vector3::x())
+}
+
+/// What `obstacle` forbids at that point: one half-space, or two. `side` is where the vehicle itself is.
+fn constraints(point_ned_m: Vector3<f64>, obstacle: &Obstacle, own_side: Vector3<f64>) -> impl Iterator<Item = Constraint> {
     let one = constraint(point_ned_m, obstacle);
-    let across = Vector3::new(one.normal.x, one.normal.y, 0.0);
-    if one.normal.z <= 0.0 || across.norm() > STEEP {
+    if one.normal.z < BELOW {
         return [Some(one), None].into_iter().flatten();
     }
-    // Right below it, going aside makes hardly any distance: no climbing after it, but no descent either; and where distance must be
-    // made, aside as fast as that.
+    // Going aside makes little distance right below it: no climbing after it, but no descent either; and where distance must be made, aside
+    // as fast as makes it at 45°.
     let up = Constraint { normal: Vector3::z(), push: Vector3::z(), bound_mps: one.bound_mps.min(0.0), give: one.give };
-    let aside = if across.norm() > 1e-6 { across / across.norm() } else { Vector3::x() };
-    let aside = (one.bound_mps > 0.0).then_some(Constraint { normal: aside, push: aside, ..one });
+    let side = Some(side(point_ned_m, obstacle)).filter(|side| side.dot(&own_side) >= 0.0).unwrap_or(own_side);
+    let bound_mps = one.bound_mps / BELOW;
+    let aside = (bound_mps > 0.0).then_some(Constraint { normal: side, push: side, bound_mps, give: one.give });
     [Some(up), aside].into_iter().flatten()
 }
 
@@ -149,7 +156,7 @@ fn constraint(point_ned_m: Vector3<f64>, obstacle: &Obstacle) -> Constraint {
     let bound_mps = coming_mps + opening_mps_min(distance_m - obstacle.keep_m);
     // Up is always free; down is not, so a vehicle below gives way sideways.
     let across = Vector3::new(normal.x, normal.y, 0.0);
-    let push = if normal.z <= 0.0 || across.norm() <= STEEP { normal } else { across / across.norm() };
+    let push = if normal.z <= 0.0 || across.norm() < 1e-6 { normal } else { across / across.norm() };
     let give = GIVE * (distance_m / obstacle.keep_m.max(1e-3)).powi(2);
     Constraint { normal, push, bound_mps, give }
 }
@@ -238,7 +245,8 @@ pub fn filter(
     }
     let lead_m = points_ned_m[1] - points_ned_m[0];
     let pairs = obstacles.iter().flat_map(|obstacle| {
-        let [own, reference] = points_ned_m.map(|point| constraints(point, obstacle));
+        let own_side = side(points_ned_m[0], obstacle);
+        let [own, reference] = points_ned_m.map(|point| constraints(point, obstacle, own_side));
         // The autopilot flies after its reference by this much faster than it is asked to; after a place that has leapt it doesn't fly.
         let chased = own.map(move |one| {
             let chase_mps = (-one.normal.dot(&lead_m) * CHASE_HZ).clamp(0.0, limits.speed_mps_max);
@@ -333,10 +341,17 @@ mod tests {
             let own = Vector3::new(x, y, -5.0);
             let velocity = filter(Vector3::new(0.0, 0.0, -1.5), [own, own], own, &[above], &limits);
             let aside_mps = velocity.xy().norm();
-            assert!((0.5..=OPENING_MPS_MAX + 1e-6).contains(&aside_mps), "{x} {y}: {velocity}");
+            assert!((0.5..=OPENING_MPS_MAX / BELOW + 1e-6).contains(&aside_mps), "{x} {y}: {velocity}");
             assert!(velocity.z.abs() < 1e-6, "{velocity}");
             let outward_mps = velocity.x * x + velocity.y * y;
             assert!(outward_mps >= 0.0, "{velocity}");
+        }
+        // Lower by its distance from below, whichever side of the line of 45° it is: no leap.
+        for x in [2.0, 2.9, 3.1, 3.5] {
+            let own = Vector3::new(x, 0.0, -5.0);
+            let velocity = filter(Vector3::new(0.0, 0.0, -1.5), [own, own], own, &[above], &limits);
+            let leaves_mps = velocity.dot(&(own - above.position_ned_m).normalize());
+            assert!(leaves_mps > 0.3 && velocity.norm() < 4.5, "{x}: {velocity}");
         }
         // Far below it climbs, as fast as it can still stop.
         let own = Vector3::new(0.0, 0.0, -1.0);

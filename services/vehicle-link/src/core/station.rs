@@ -4,6 +4,19 @@
 
 use mavlink::dialects::ardupilotmega::{MavCmd, MavMessage};
 
+/// Whether the message asks ArduCopter for GUIDED: where that is the mode already, nothing else tells.
+#[must_use]
+#[allow(deprecated, reason = "ground stations still send SET_MODE")]
+pub fn sets_guided(message: &MavMessage) -> bool {
+    const GUIDED: u32 = 4;
+    match message {
+        MavMessage::SET_MODE(data) => data.custom_mode == GUIDED,
+        MavMessage::COMMAND_LONG(data) => data.command == MavCmd::MAV_CMD_DO_SET_MODE && data.param2 == GUIDED as f32,
+        MavMessage::COMMAND_INT(data) => data.command == MavCmd::MAV_CMD_DO_SET_MODE && data.param2 == GUIDED as f32,
+        _ => false,
+    }
+}
+
 /// What the message asks for, in words, if it moves the vehicle; `None` for everything else. Changes of mode are seen in the
 /// heartbeat, arming is nobody's flight yet, and a joystick that lies on the table speaks all the time, and flies nothing in GUIDED.
 #[must_use]

@@ -6,7 +6,8 @@
 //! upwards than sideways, geoid models differ by decimetres, a lake isn't at sea level); the barometer and the estimator hold the
 //! relative one to decimetres over a flight, and a jetty's height is measured with a tape. The home that counts is the one it took
 //! off from: an autopilot whose home is set anew in flight, or where it is armed again after a landing elsewhere, counts its height from
-//! there. That shows in the same message, as a step between its two altitudes, and is made up for.
+//! there. That shows in one message: the height above home steps, and the altitude above the sea does not. It is made up for. The other way
+//! round it is no new home: without a position ArduPilot gives its receiver's altitude, or an old one, and its estimator's height.
 //!
 //! # Ages
 //! Every part says how old it is. Health that is old, or dated ahead of now by a clock that was set back, is unknown.
@@ -33,12 +34,12 @@ const DISTANCE_SENSOR_S: f64 = 2.0;
 const SIGNAL_INVALID: u8 = 1;
 /// What is dated further ahead of now than this is not fresh, seconds.
 const AHEAD_S: f64 = 0.5;
-/// The autopilot's two altitudes come from one estimate: their difference, home's altitude, steps by more than this only when home is
-/// set anew, metres. By more than the greatest, it is an error.
+/// Home's altitude, the difference of the autopilot's two, steps by more than this only when home is set anew, metres.
 const HOME_STEP_M: f64 = 0.2;
-const HOME_STEP_M_MAX: f64 = 1000.0;
 /// Landed further from home than this, it is elsewhere, metres: receivers wander.
 const HOME_WITHIN_M: f64 = 20.0;
+/// A home that is higher above the water than this can be told from the water by the height, metres.
+const JETTY_M: f64 = 0.5;
 /// The boot clock's offset to the fleet's is the least delay seen in the last one to two of these, seconds.
 const OFFSET_WINDOW_S: f64 = 10.0;
 
@@ -67,6 +68,15 @@ struct Position {
 impl Position {
     fn home_amsl_m(&self) -> f64 {
         self.geodetic.altitude_m - self.relative_altitude_m
+    }
+
+    /// By how much higher home was set since, metres: what the height above home steps by while the altitude does as the climb says.
+    fn home_rise_since_m(&self, before: &Self) -> f64 {
+        let rise_m = self.home_amsl_m() - before.home_amsl_m();
+        let climb_mps = -0.5 * (self.velocity_ned_mps.z + before.velocity_ned_mps.z);
+        let climb_m = climb_mps * self.stamp.seconds_since(before.stamp).max(0.0);
+        let step_m = self.geodetic.altitude_m - before.geodetic.altitude_m - climb_m;
+        if step_m.abs() < 0.5 * rise_m.abs() { rise_m } else { 0.0 }
     }
 }
 
@@ -140,6 +150,9 @@ impl Telemetry {
                 return true;
             }
             MavMessage::GLOBAL_POSITION_INT(data) => {
+                if self.boot.is_new_life(data.time_boot_ms) {
+                    self.started_again();
+                }
                 let stamp = self.boot.stamp(data.time_boot_ms, now);
                 self.observe_position(position(data, stamp));
                 return true;
@@ -219,6 +232,9 @@ impl Telemetry {
                 self.estimator_ok = Some(Aged(data.flags.contains(need) && !data.flags.intersects(refuse), now));
             }
             MavMessage::SYSTEM_TIME(data) => {
+                if self.boot.is_new_life(data.time_boot_ms) {
+                    self.started_again();
+                }
                 let _ = self.boot.stamp(data.time_boot_ms, now);
             }
             _ => {}
@@ -261,21 +277,31 @@ impl Telemetry {
     }
 
     fn observe_position(&mut self, position: Option<Position>) {
-        let rise_m = self.position.zip(position).map_or(0.0, |(before, now)| now.home_amsl_m() - before.home_amsl_m());
-        if (HOME_STEP_M..=HOME_STEP_M_MAX).contains(&rise_m.abs()) {
+        let rise_m = self.position.zip(position).map_or(0.0, |(before, now)| now.home_rise_since_m(&before));
+        if rise_m.abs() >= HOME_STEP_M {
             // At home it is where the vehicle stands again, without the barometer's drift.
-            let elsewhere = self.off_the_ground || position.is_some_and(|position| self.is_away(&position));
+            let elsewhere = self.off_the_ground || self.position.is_some_and(|before| self.is_away(&before));
             self.home_rise_m = if elsewhere { self.home_rise_m + rise_m } else { 0.0 };
         }
-        if rise_m.abs() <= HOME_STEP_M_MAX {
-            self.position = position;
-        }
+        self.position = position;
     }
 
-    /// Whether it has flown, and is not where it took off.
+    /// Whether it has flown, and is not where it took off, but on the water.
     fn is_away(&self, position: &Position) -> bool {
         let ned_m = |place| self.frame.ned_from_geodetic(place);
-        self.home_of_flight.is_some_and(|home| (ned_m(home) - ned_m(position.geodetic)).xy().norm() > HOME_WITHIN_M)
+        let away_m = |home| (ned_m(home) - ned_m(position.geodetic)).xy().norm();
+        let height_m = position.relative_altitude_m + self.home_height_m + self.home_rise_m;
+        let is_down = self.home_height_m > JETTY_M && height_m < 0.5 * self.home_height_m;
+        self.home_of_flight.is_some_and(|home| is_down || away_m(home) > HOME_WITHIN_M)
+    }
+
+    /// The autopilot started again: its home is another, and whatever was known of it is of the life before.
+    fn started_again(&mut self) {
+        self.position = None;
+        self.home = None;
+        self.home_of_flight = None;
+        self.off_the_ground = false;
+        self.home_rise_m = 0.0;
     }
 
     /// What the autopilot's relative altitude lacks because its home was set anew, metres. What is sent to it is short of that, too.
@@ -440,10 +466,14 @@ struct BootClock {
 }
 
 impl BootClock {
+    /// Back by more than a second: the autopilot started again.
+    fn is_new_life(&self, boot_ms: u32) -> bool {
+        self.last_ms.is_some_and(|last| boot_ms.saturating_add(1000) < last)
+    }
+
     fn stamp(&mut self, boot_ms: u32, now: Stamp) -> Stamp {
         let offset_ns = now.as_nanos().saturating_sub(i64::from(boot_ms) * 1_000_000);
-        // Back by more than a second: the autopilot started again.
-        if self.last_ms.is_some_and(|last| boot_ms.saturating_add(1000) < last) {
+        if self.is_new_life(boot_ms) {
             self.window = None;
         }
         self.last_ms = Some(boot_ms);
@@ -683,9 +713,36 @@ mod tests {
         assert_eq!(at(&mut telemetry, water, 225.2, -6.5, 20.0), 0.0);
         telemetry.observe(&landed(ardu::MavLandedState::MAV_LANDED_STATE_ON_GROUND), t(20.0));
         assert_eq!(at(&mut telemetry, water, 225.2, 0.0, 25.0), 0.0);
+        // Its receiver's altitude instead of the estimator's, and back after wandering: no new home.
+        for amsl_m in [229.2, 231.0, 227.2, 225.2] {
+            assert_eq!(at(&mut telemetry, water, amsl_m, 0.0, 30.0), 0.0);
+        }
+        // A frozen one while it climbs; and back.
+        for step in 0..=60 {
+            let relative_m = 0.15 * f64::from(step);
+            let height_m = at(&mut telemetry, water, 225.2, relative_m, 30.0 + 0.1 * f64::from(step));
+            assert!((height_m - relative_m).abs() < 1e-9);
+        }
+        for (amsl_m, relative_m) in [(234.2, 9.0), (225.2, 9.0), (225.2, 9.0 - 0.15)] {
+            assert!((at(&mut telemetry, water, amsl_m, relative_m, 40.0) - relative_m).abs() < 1e-9);
+        }
+        let mut relative_m = 9.0 - 0.15;
+        while relative_m > 0.0 {
+            relative_m = f64::max(relative_m - 0.15, 0.0);
+            at(&mut telemetry, water, 225.2, relative_m, 45.0);
+        }
         // Carried home and armed, it is at home.
         assert!((at(&mut telemetry, here, 226.9, 1.7, 90.0) - 1.7).abs() < 1e-9);
         assert_eq!(at(&mut telemetry, here, 226.9, 0.0, 90.1), 1.5);
+        // Taken off from there, afloat beside the jetty, and armed: that is not home.
+        telemetry.observe(&landed(ardu::MavLandedState::MAV_LANDED_STATE_IN_AIR), t(91.0));
+        telemetry.observe(&landed(ardu::MavLandedState::MAV_LANDED_STATE_ON_GROUND), t(120.0));
+        assert!(at(&mut telemetry, here + 1000, 225.4, -1.5, 120.0).abs() < 1e-9);
+        assert!(at(&mut telemetry, here + 1000, 225.4, 0.0, 121.0).abs() < 1e-9);
+        // A lake at 1500 m, and home set with an altitude of 0.
+        assert!((at(&mut telemetry, here + 1000, 225.4, 225.4, 122.0)).abs() < 1e-9);
+        // Started again, it counts as at first.
+        assert_eq!(at(&mut telemetry, here, 226.9, 0.25, -49.0), 1.75);
     }
 
     /// Messages delayed by a queue are still dated when they were measured; a restarted autopilot starts the offset afresh.

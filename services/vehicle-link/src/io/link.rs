@@ -60,6 +60,8 @@ pub enum LinkEvent {
     Rejected(Verdict),
     /// A ground station sends this system something that flies it: [`crate::core::station::flies`].
     Station(u8, &'static str),
+    /// A ground station asks this system for GUIDED.
+    StationGuided(u8),
     /// The connection is gone, and why.
     Down(String),
 }
@@ -218,9 +220,11 @@ impl Keeper {
                     budget.spend(frame.bytes().len());
                     let message = frame.message();
                     let target = message.as_ref().and_then(mavlink::Message::target_system_id).unwrap_or(0);
-                    if let Some(what) = message.as_ref().and_then(station::flies) {
+                    let flies = message.as_ref().and_then(station::flies).map(|what| LinkEvent::Station(target, what));
+                    let guided = message.as_ref().is_some_and(station::sets_guided).then_some(LinkEvent::StationGuided(target));
+                    if let Some(event) = flies.or(guided) {
                         // Told before it is sent on, so that no setpoint of ours comes after it. The queue is read all the time.
-                        let _ = self.clock.timeout(WRITE, self.events.send(LinkEvent::Station(target, what))).await;
+                        let _ = self.clock.timeout(WRITE, self.events.send(event)).await;
                     }
                     Some((frame, if target == 0 { To::All } else { To::System(target) }))
                 }
@@ -287,8 +291,9 @@ impl Keeper {
             if self.systems.len() < SYSTEMS_MAX || self.systems.contains_key(&system) {
                 self.systems.entry(system).or_default().observe(frame.version(), now);
             }
-            // The checksum of a message that is not known here is not known, either.
-            if !writer.learn(system, from, message.is_some(), now) {
+            // The checksum of a message that is not known here is not known, either; our signature is as good.
+            let sound = message.is_some() || self.signer.is_some();
+            if !writer.learn(system, from, sound, now) {
                 metrics::counter!("vehicle_link_frames_rejected_total", "reason" => "another_sender").increment(1);
                 return false;
             }

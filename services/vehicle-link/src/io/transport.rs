@@ -11,6 +11,7 @@ use halcyon_model::Stamp;
 use tokio::io::{AsyncRead, AsyncReadExt as _, AsyncWrite, AsyncWriteExt as _};
 use tokio::net::{TcpListener, TcpStream, UdpSocket};
 use tokio_serial::SerialPortBuilderExt as _;
+use tracing::warn;
 
 use crate::core::frame::{Frame, Framer};
 use crate::endpoint::Endpoint;
@@ -29,6 +30,8 @@ pub(super) struct Reader {
     source: Source,
     buffer: Vec<u8>,
     unframed_bytes: usize,
+    /// That another host speaks.
+    told: bool,
 }
 
 enum Source {
@@ -101,7 +104,7 @@ impl Places {
 
 impl Reader {
     fn new(source: Source) -> Self {
-        Self { source, buffer: vec![0; READ_BYTES], unframed_bytes: 0 }
+        Self { source, buffer: vec![0; READ_BYTES], unframed_bytes: 0, told: false }
     }
 
     /// The frames of the next bytes, perhaps none, and where they came from if that can vary. Cancel-safe.
@@ -120,6 +123,9 @@ impl Reader {
                 let (length, from) = socket.recv_from(&mut self.buffer).await?;
                 if host.is_some_and(|host| from.ip().to_canonical() != host) {
                     metrics::counter!("vehicle_link_frames_rejected_total", "reason" => "another_sender").increment(1);
+                    if !std::mem::replace(&mut self.told, true) {
+                        warn!(%from, "not heard: another host than the one that is configured");
+                    }
                     return Ok((Vec::new(), Some(from)));
                 }
                 Ok((Framer::datagram(self.buffer.get(..length).unwrap_or_default()), Some(from)))

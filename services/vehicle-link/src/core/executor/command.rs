@@ -52,7 +52,7 @@ impl Executor {
             // Whatever else is the matter.
             self.take_over(Goal::Stay, command);
             self.flown = Some(Goal::Stay);
-            self.terminated = true;
+            self.terminated = Some(now);
             return Ok(Decision::Ask(Command::Disarm { force: true }));
         }
         if silent_s > self.config.fail_safe.autopilot_silent_s {
@@ -175,7 +175,7 @@ impl Executor {
             // The one way back to the plan. The vehicle is ours again once the autopilot says GUIDED, not before: it may refuse,
             // and asking on would fight the pilot.
             self.direct = None;
-            self.terminated = false;
+            self.terminated = None;
             if !self.airborne {
                 self.flown = None;
             }

@@ -23,7 +23,7 @@ const NEAR_M: f64 = 3.0;
 pub(super) const LOW_M: f64 = 0.7;
 /// A velocity that the separation filter has changed by more than this is braked with an acceleration on top, up to so much: metres
 /// per second, metres per second squared.
-const REFUSED_MPS: f64 = 0.3;
+pub(super) const REFUSED_MPS: f64 = 0.3;
 const BRAKING_MPS2_MAX: f64 = 4.0;
 /// Setpoints end this far inside the fence, metres.
 const FENCE_INSIDE_M: f64 = 2.0;
@@ -263,6 +263,9 @@ impl Executor {
         let mut velocity = separation::filter(wanted, points, target.position_ned_m, &obstacles, limits);
         limit_velocity(&mut velocity, limits, limits.descent_mps);
         reference.advance(velocity, step.here_ned_m, step.dt_s);
+        // The floor lifts nobody into whoever is above.
+        let is_under = velocity.z > wanted.z + REFUSED_MPS && wanted.z < 0.0;
+        let floor_m = if is_under { floor_m.min(step.height_m()) } else { floor_m };
         let Reference { position_ned_m, velocity_ned_mps } = self.bounded(reference, floor_m, step);
         // Somebody is in the way: what the velocity loop would do in half a second is asked for at once.
         let refused_mps = (velocity - wanted).norm();

@@ -1,6 +1,6 @@
 //! On the ground: waiting, arming, taking off; and what counts as landed.
 
-use halcyon_model::{Activity, FlightMode, LandedState, LocalPoint, Severity, Stamp, VehicleState};
+use halcyon_model::{Activity, FlightMode, Geodetic, LandedState, LocalPoint, Severity, Stamp, VehicleState};
 
 use super::{Climb, Executor, Goal, Home, Output};
 use crate::core::commands::Command;
@@ -14,8 +14,12 @@ use crate::core::px4::TakeOff;
 const LANDED_WITHIN_M: f64 = 5.0;
 /// Nearer than this to home, it is there: receivers wander by metres.
 const HOME_WITHIN_M: f64 = 20.0;
+/// A home that is higher above the water than this can be told from the water by the height, metres.
+const JETTY_M: f64 = 0.5;
 /// A barometer drifts by no more than this in a flight, metres.
 const DRIFT_M_MAX: f64 = 5.0;
+/// Nothing that floats or stands has its rangefinder higher than this, metres.
+const ABOVE_ALL_M: f64 = 2.0;
 /// The take-off height is at least this much above the ground that it stands on, metres.
 const CLIMB_M_MIN: f64 = 2.5;
 
@@ -93,7 +97,11 @@ impl Executor {
                 let ground_m = -own.position_ned_m.z;
                 let height_m = self.config.limits.safe_height_m.max(ground_m + CLIMB_M_MIN);
                 // ArduCopter with a rangefinder counts from what is below instead. Too high is ended as soon as it is high enough.
-                let height_above_home_m = height_m - self.config.home_height_m.min(ground_m);
+                let from_m = match Family::named(own.firmware.as_ref()) {
+                    Family::ArduPilot => self.config.home_height_m.min(ground_m),
+                    Family::Px4 => self.config.home_height_m,
+                };
+                let height_above_home_m = height_m - from_m;
                 let before = outputs.len();
                 self.request(Command::TakeOff { height_above_home_m }, now, outputs);
                 if outputs.len() > before && Family::named(own.firmware.as_ref()) == Family::Px4 {
@@ -107,15 +115,26 @@ impl Executor {
         }
     }
 
-    /// Whether somebody else, or a crash, stopped the motors that we had started: before a take-off, or in the air in GUIDED, but for a
-    /// descent, that may end on the water. Not at our request.
+    /// Whether somebody else stopped the motors that we had started to take off with: in a mode of ours, and not at our request.
     pub(super) fn stopped_by_others(&self, state: &VehicleState) -> bool {
         let were_on = self.own.as_ref().is_some_and(|own| own.state.armed);
         let asked =
             self.pending.as_ref().is_some_and(|pending| matches!(pending.command, Command::Disarm { .. }) && !pending.failed);
         let to_fly = matches!(self.activity, Activity::Preparing | Activity::TakingOff) && self.may_take_off_in(state);
-        let flies = self.control.is_ours(FlightMode::Guided) && state.mode == FlightMode::Guided && !self.descending;
-        were_on && !state.armed && !asked && if self.airborne { flies } else { to_fly }
+        were_on && !state.armed && !self.airborne && to_fly && !asked
+    }
+
+    /// Whether it came down, as `state` says, though it was not to: its motors were stopped in the air, by a crash or by somebody, or it
+    /// sank onto something. In GUIDED anywhere but in a descent, which may end on the water; in every mode from higher than a height is wrong.
+    pub(super) fn falls(&self, state: &VehicleState) -> bool {
+        let Some(before) = self.own.as_ref().map(|own| &own.state) else { return false };
+        let knows = !state.armed || state.landed == LandedState::OnGround;
+        let guided = before.mode == FlightMode::Guided && !self.descending;
+        let rises = self.climb.is_some() && before.mode == Family::named(before.firmware.as_ref()).climbs_in();
+        let range_m = before.range.map(|range| range.distance_m);
+        let high_m = self.config.limits.land_mode_height_m + DRIFT_M_MAX;
+        let high = range_m.map_or(-before.position_ned_m.z > high_m, |range_m| range_m > ABOVE_ALL_M);
+        knows && !self.control.hands_off() && (guided || rises || high)
     }
 
     /// Hands off until GUIDED is set: starting the motors again would be a fight with whoever stopped them, who may stand beside them.
@@ -143,10 +162,14 @@ impl Executor {
     /// Whether it stands where it is at home. ArduCopter takes home anew wherever it is armed, unless home was set: one that is armed
     /// on the water again would return to the water.
     fn is_home(&self, own: &VehicleState) -> bool {
-        own.home.is_none_or(|home| {
-            let away_m = self.config.frame.ned_from_geodetic(home).xy() - own.position_ned_m.xy();
-            away_m.norm() <= HOME_WITHIN_M
-        })
+        let home_m = self.config.home_height_m;
+        // Beside a jetty it is not on it.
+        let is_down = home_m > JETTY_M && -own.position_ned_m.z < 0.5 * home_m;
+        own.home.is_none_or(|home| !is_down && self.is_near(own, home))
+    }
+
+    pub(super) fn is_near(&self, own: &VehicleState, home: Geodetic) -> bool {
+        (self.config.frame.ned_from_geodetic(home).xy() - own.position_ned_m.xy()).norm() <= HOME_WITHIN_M
     }
 
     /// Why it may not take off for `goal` now, if it may not.
@@ -157,6 +180,10 @@ impl Executor {
         }
         if self.has_twin(now) {
             return Some(format!("another vehicle calls itself {}", self.config.vehicle));
+        }
+        if self.lost_home(own) {
+            let what = "the autopilot started again away from home, and its height above the water is not known";
+            return Some(format!("{what}: bring it home"));
         }
         if !own.estimator_ok {
             return Some("waiting for the estimator's position".into());

@@ -64,6 +64,10 @@ use watch::Watch;
 pub const RESTART_GRACE_S: f64 = 10.0;
 /// A request that was refused or unanswered is made again after this time, seconds.
 const AGAIN_S: f64 = 5.0;
+/// A termination stops the motors within this time, or not at all; and motors that stop within this time after it came down by itself were
+/// not stopped for a landing, seconds.
+const TERMINATED_S: f64 = 10.0;
+const FELL_S: f64 = 20.0;
 /// What was asked of the autopilot is what the vehicle means to do for so long, seconds.
 const INTENT_S_MAX: f64 = 0.5;
 /// Neighbours remembered; the fleet is smaller.
@@ -222,7 +226,9 @@ pub struct Executor {
     withdraw: bool,
     home: Home,
     /// A person wants the motors stopped, whatever it does.
-    terminated: bool,
+    terminated: Option<Stamp>,
+    /// It came down though it was not to.
+    fell: Option<Stamp>,
     ask_streams: bool,
 }
 
@@ -273,7 +279,8 @@ impl Executor {
             notes: Vec::new(),
             withdraw: false,
             home: Home::default(),
-            terminated: false,
+            terminated: None,
+            fell: None,
             ask_streams: false,
         }
     }
@@ -376,13 +383,20 @@ impl Executor {
                 }
                 self.note(Severity::Info, "the vehicle was handed back", mode_name(state.mode));
             }
-            Change::Over => self.note(Severity::Info, "the pilot's flight is over", mode_name(state.mode)),
+            Change::Over => {
+                self.note(Severity::Info, "the pilot's flight is over", mode_name(state.mode));
+                // A task that came while he flew, or that our predecessor may have lost it in, doesn't start the motors in his hands.
+                if self.restarted_at.is_some() || self.goal().is_some_and(|goal| goal.wants_flight()) {
+                    self.flown = self.goal();
+                    self.control.let_go();
+                }
+            }
         }
         if stopped {
             self.stands_down("the motors were stopped, not by us");
         }
-        if self.terminated && !state.armed {
-            self.terminated = false;
+        let recent = |at: Stamp, for_s: f64| (0.0..=for_s).contains(&now.seconds_since(at));
+        if !state.armed && self.terminated.take().is_some_and(|at| recent(at, TERMINATED_S)) {
             self.stands_down("the motors were stopped by a termination");
         }
         let was_airborne = self.airborne;
@@ -391,9 +405,16 @@ impl Executor {
             self.restarted_at = Some(now);
         }
         self.continuity.observe(state.stamp, state.position_ned_m, state.velocity_ned_mps);
+        if was_airborne && !self.airborne && self.falls(&state) {
+            self.fell = Some(now);
+        }
+        let armed = state.armed;
         self.own = Some(Own { state, mode_heard });
         if was_airborne && !self.airborne {
             self.touched_down();
+        }
+        if !armed && self.fell.take().is_some_and(|at| recent(at, FELL_S)) {
+            self.stands_down("it came down though it was not to land");
         }
     }
 
@@ -420,6 +441,13 @@ impl Executor {
         self.note(Severity::Warning, "the pilot has the vehicle", format!("a ground station {what}; set GUIDED to hand back"));
     }
 
+    /// A ground station on our link asked the autopilot for GUIDED: that hands it back, though it may be GUIDED already.
+    pub fn observe_station_guided(&mut self, now: Stamp) {
+        if self.own.as_ref().is_some_and(|own| Family::named(own.state.firmware.as_ref()) == Family::ArduPilot) {
+            self.control.expect(FlightMode::Guided, now);
+        }
+    }
+
     /// The autopilot said something.
     pub fn observe_text(&mut self, text: &str, now: Stamp) {
         if text.to_ascii_lowercase().contains("failsafe") {
@@ -431,7 +459,7 @@ impl Executor {
     /// How a request ended.
     pub fn observe_outcome(&mut self, command: &Command, outcome: &Result<(), CommandError>, now: Stamp) {
         self.observe_payload(command, outcome);
-        let ours = self.pending.as_ref().is_some_and(|pending| pending.command == *command);
+        let ours = self.pending.as_ref().is_some_and(|pending| is_same(&pending.command, command));
         if let Command::TakeOff { .. } = command {
             self.take_off.answered(outcome.is_ok());
         }
@@ -510,9 +538,14 @@ impl Executor {
         self.try_adopt(&own.state);
         if self.control.hands_off() {
             self.let_go();
+            self.fail_safes.released();
             let mode = mode_name(own.state.mode);
             match self.autopilot_fail_safe(now) {
                 Some(words) => self.set(Activity::FailSafe { reason: format!("autopilot: {words}") }, mode),
+                // Only a change shows from afar.
+                None if own.state.mode == FlightMode::Guided => {
+                    self.set(Activity::PilotControl, "mode GUIDED; set it anew, from another mode, to hand back");
+                }
                 None => self.set(Activity::PilotControl, format!("mode {mode}; set GUIDED to hand back")),
             }
             return;
@@ -570,7 +603,7 @@ impl Executor {
     /// Asks for `command` unless it is under way, or was asked for a moment ago.
     fn request(&mut self, command: Command, now: Stamp, outputs: &mut Vec<Output>) {
         if let Some(pending) = &self.pending {
-            let same = pending.command == command;
+            let same = is_same(&pending.command, &command);
             // A new wish waits for the old one's answer, unless that is overdue: the transaction layer gives up within 5 s.
             let wait_s = if same || pending.failed { AGAIN_S } else { 0.5 };
             if (same || !pending.failed) && now.seconds_since(pending.at) < wait_s {
@@ -666,6 +699,11 @@ fn is_airborne(state: &VehicleState) -> bool {
             LandedState::InAir | LandedState::TakingOff | LandedState::Landing => true,
             LandedState::Unknown => -state.position_ned_m.z > 1.0 || state.velocity_ned_mps.norm() > 1.0,
         }
+}
+
+/// Whether it is one wish: the height of a take-off is by where it stands, which is not known to the last millimetre.
+fn is_same(a: &Command, b: &Command) -> bool {
+    a == b || matches!((a, b), (Command::TakeOff { .. }, Command::TakeOff { .. }))
 }
 
 fn before_reason(activity: &Activity) -> &str {

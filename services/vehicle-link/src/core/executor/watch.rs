@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, VecDeque};
 use halcyon_model::{Geodetic, LandedState, Severity, Stamp, VehicleId, VehicleState};
 use nalgebra::Vector3;
 
-use super::flight::{LOW_M, Step};
+use super::flight::{LOW_M, REFUSED_MPS, Step};
 use super::{Executor, Home, Output};
 use crate::core::boot::{BootWatch, Finding};
 use crate::core::guidance::{Setpoint, limit_velocity};
@@ -64,6 +64,8 @@ pub(super) struct Watch {
     /// Home as it was when the vehicle left the ground.
     home: Option<Geodetic>,
     home_moved: bool,
+    /// Home before the autopilot started again away from it: its heights were above that one.
+    lost_home: Option<Geodetic>,
     off_the_ground: Option<Stamp>,
     own_stamps: VecDeque<Stamp>,
     twin: Option<Twin>,
@@ -171,9 +173,15 @@ impl Executor {
     }
 
     fn autopilot_restarted(&mut self) {
-        let (severity, what) = if self.airborne {
+        let flies = self.goal().is_some_and(|goal| goal.wants_flight());
+        let own = self.own.as_ref().map(|own| &own.state);
+        self.watch.lost_home = self.watch.home.filter(|home| own.is_some_and(|own| !self.is_near(own, *home)));
+        if self.airborne || flies {
+            // On the ground, too: who changed its battery may hold it.
             self.control.let_go();
             self.flown = self.goal();
+        }
+        let (severity, what) = if self.airborne {
             (Severity::Critical, "the autopilot started again in flight")
         } else {
             (Severity::Warning, "the autopilot started again")
@@ -184,7 +192,9 @@ impl Executor {
         self.pending = None;
         self.home = Home::Loose;
         self.watch.position = JumpWatch::default();
-        self.note(severity, what, "hands off until GUIDED is set");
+        let why =
+            if self.airborne || flies { "hands off until GUIDED is set" } else { "what it was asked for is asked for again" };
+        self.note(severity, what, why);
     }
 
     fn watch_home(&mut self, state: &VehicleState, now: Stamp) {
@@ -205,6 +215,11 @@ impl Executor {
             let why = format!("by {moved_m:.0} m: a return goes to where it took off");
             self.note(Severity::Warning, "home moved in flight", why);
         }
+    }
+
+    /// Whether the autopilot started again away from home, and hasn't been there since.
+    pub(super) fn lost_home(&self, own: &VehicleState) -> bool {
+        self.watch.lost_home.is_some_and(|home| !self.is_near(own, home))
     }
 
     /// Where a return goes: home as it was when the vehicle left the ground.
@@ -248,7 +263,8 @@ impl Executor {
         if low {
             velocity_ned_mps.z = velocity_ned_mps.z.min(0.0);
         }
-        let position_ned_m = Vector3::new(here.x, here.y, here.z.min(-limits.safe_height_m));
+        let above_m = if velocity_ned_mps.z > wanted.z + REFUSED_MPS { step.height_m() } else { limits.safe_height_m };
+        let position_ned_m = Vector3::new(here.x, here.y, here.z.min(-above_m));
         step.outputs.push(Output::Setpoint(Setpoint {
             position_ned_m,
             velocity_ned_mps,

@@ -208,10 +208,21 @@ fn an_autopilot_that_starts_again_in_flight_is_left_alone_until_guided_is_set() 
         Decision::Ask(Command::SetMode(FlightMode::Guided))
     );
     world.until(10.0, keep, |world| matches!(world.activity(0), Activity::Holding { settled: true }));
-    // On the ground it is no matter.
+    // On the ground it is no matter, unless it was to fly: who changed the battery may hold it.
     let mut world = World::new(&[(0.0, 0.0)]);
     world.run(2.0, |_| {});
     world.copters[0].boot_s = 0.0;
+    world.run(1.0, |_| {});
+    world.copters[0].ready = false;
+    world.run(2.0, keep);
+    world.copters[0].boot_s = 0.0;
+    world.run(1.0, keep);
+    world.copters[0].ready = true;
+    world.run(10.0, |world| {
+        keep(world);
+        assert!(!world.copters[0].armed);
+    });
+    world.command(0, VehicleAction::SetMode(FlightMode::Guided));
     world.until(60.0, keep, |world| matches!(world.activity(0), Activity::Holding { settled: true }));
 }
 

@@ -289,3 +289,158 @@ fn a_take_off_from_below_home_is_high_enough_by_either_count() {
         assert!(took_s < 12.0, "{took_s}");
     }
 }
+
+/// GUIDED that a person set, by his transmitter, before the take-off: a crash is one all the same.
+#[test]
+fn a_crash_is_one_whoever_set_guided() {
+    let mut world = World::new(&[(0.0, 0.0)]);
+    world.copters[0].mode = FlightMode::Guided;
+    world.until(60.0, plan, |world| world.height(0) > 3.0);
+    world.copters[0].armed = false;
+    world.run(30.0, |world| {
+        world.plan(&[(0, survey(80.0, 0.0))], 5.0);
+        assert!(!asked(world, Command::Arm));
+    });
+    assert!(matches!(world.activity(0), Activity::PilotControl), "{:?}", world.activity(0));
+}
+
+/// That it stands on the ground is heard before that its motors are off; in GUIDED, or in LAND from high up.
+#[test]
+fn what_falls_stays_down_though_the_ground_is_heard_first() {
+    for (mode, height_m) in [(FlightMode::Guided, 5.0), (FlightMode::Land, 20.0)] {
+        let mut world = World::new(&[(0.0, 0.0)]);
+        world.airborne(0, Vector3::new(40.0, 0.0, -height_m));
+        world.run(3.0, plan);
+        if mode == FlightMode::Land {
+            world.command(0, VehicleAction::Land);
+            world.until(5.0, plan, |world| world.copters[0].mode == mode);
+        }
+        let stamp = |world: &World| world.now.plus_secs_f64(0.05);
+        let grounded = halcyon_model::VehicleState {
+            landed: halcyon_model::LandedState::OnGround,
+            ..world.copters[0].state(stamp(&world))
+        };
+        let now = stamp(&world);
+        world.executors[0].observe_self(grounded, now, now);
+        world.copters[0].armed = false;
+        world.run(30.0, |world| {
+            world.plan(&[(0, survey(80.0, 0.0))], 5.0);
+            assert!(!asked(world, Command::Arm), "{mode:?}");
+        });
+        assert!(matches!(world.activity(0), Activity::PilotControl), "{mode:?} {:?}", world.activity(0));
+    }
+}
+
+/// He flies by himself; a plan has a task for it meanwhile. He lands, and stops the motors: they stay off.
+#[test]
+fn a_task_that_came_while_the_pilot_flew_waits_for_guided() {
+    for after_a_restart in [false, true] {
+        let mut world = World::new(&[(0.0, 0.0)]);
+        world.step();
+        world.copters[0].mode = FlightMode::Loiter;
+        world.copters[0].armed = true;
+        world.copters[0].position.z = -5.0;
+        if after_a_restart {
+            world.executors[0] = Executor::new(config("v0"));
+        }
+        world.run(2.0, |_| {});
+        world.run(2.0, plan);
+        world.copters[0].position.z = 0.0;
+        world.run(1.0, plan);
+        world.copters[0].armed = false;
+        world.run(30.0, |world| {
+            plan(world);
+            assert!(!asked(world, Command::Arm), "{after_a_restart}");
+        });
+        world.command(0, VehicleAction::SetMode(FlightMode::Guided));
+        world.until(60.0, plan, |world| world.height(0) > 3.0);
+    }
+}
+
+/// A LAND for a bad estimator was taken over by the pilot; long after it was good again he hands it back: it flies on, and does not land.
+#[test]
+fn a_landing_that_the_pilot_ended_does_not_go_on_when_he_hands_back() {
+    let mut world = World::new(&[(0.0, 0.0)]);
+    world.airborne(0, Vector3::new(40.0, 0.0, -30.0));
+    world.run(2.0, plan);
+    world.copters[0].estimator_ok = false;
+    world.until(30.0, plan, |world| world.copters[0].mode == FlightMode::Land);
+    world.copters[0].mode = FlightMode::Loiter;
+    world.run(1.0, plan);
+    world.copters[0].estimator_ok = true;
+    world.run(60.0, plan);
+    world.copters[0].mode = FlightMode::Guided;
+    world.run(10.0, |world| {
+        plan(world);
+        assert_eq!(world.copters[0].mode, FlightMode::Guided);
+    });
+}
+
+/// A station flew it in GUIDED, and asks for GUIDED on the relay: no heartbeat would show that.
+#[test]
+fn a_station_hands_back_by_asking_for_guided_again() {
+    let mut world = World::new(&[(0.0, 0.0)]);
+    world.airborne(0, Vector3::new(40.0, 0.0, -5.0));
+    world.run(2.0, plan);
+    world.executors[0].observe_station("sends targets");
+    world.run(2.0, plan);
+    assert!(matches!(world.activity(0), Activity::PilotControl));
+    let now = world.now;
+    world.executors[0].observe_station_guided(now);
+    world.run(2.0, plan);
+    assert!(matches!(world.activity(0), Activity::Holding { .. } | Activity::Transit), "{:?}", world.activity(0));
+}
+
+/// Low, with another vehicle right above: the floor under all flight does not lift it into that.
+#[test]
+fn the_floor_lifts_nobody_into_whoever_is_above() {
+    let mut world = World::new(&[(0.0, 0.0), (0.0, 60.0)]);
+    world.airborne(0, Vector3::new(40.0, 0.0, -1.5));
+    world.airborne(1, Vector3::new(40.3, 0.0, -6.0));
+    world.copters[0].finds_ground = false;
+    let both = |world: &mut World| drop(world.plan(&[(0, survey(40.0, 0.0)), (1, survey(40.3, 0.0))], 5.0));
+    world.run(20.0, |world| {
+        both(world);
+        let apart_m = (world.copters[0].position - world.copters[1].position).norm();
+        assert!(apart_m > 4.0, "{apart_m}");
+    });
+}
+
+/// On the water below home the height of the take-off is by where it stands, which trembles: asked for once, and its refusal told once.
+#[test]
+fn a_take_off_is_asked_for_once() {
+    let mut world = World::new(&[(0.0, 0.0)]);
+    world.executors[0] = Executor::new(crate::core::executor::ExecutorConfig { home_height_m: 4.0, ..config("v0") });
+    world.copters[0].home = Vector3::new(0.0, 300.0, -4.0);
+    let mut asks = 0;
+    let mut steps = 0;
+    world.until(60.0, plan, |world| world.copters[0].armed);
+    world.run(4.5, |world| {
+        plan(world);
+        let is_one = |output: &Output| matches!(output, Output::Request(Command::TakeOff { .. }));
+        asks += world.outputs[0].iter().filter(|output| is_one(output)).count();
+        steps += 1;
+        // It doesn't begin, and says nothing.
+        world.copters[0].hold_down();
+        world.copters[0].off.z = 0.001 * f64::from(steps % 7);
+    });
+    assert_eq!(asks, 1);
+}
+
+/// The battery is changed on the water: the autopilot starts there, and counts its height from there.
+#[test]
+fn an_autopilot_that_starts_again_away_from_home_does_not_take_off_there() {
+    let mut world = World::new(&[(0.0, 0.0)]);
+    world.copters[0].position = Vector3::new(60.0, 0.0, 0.0);
+    world.run(1.0, |_| {});
+    world.copters[0].boot_s = 1.0;
+    world.copters[0].home = world.copters[0].position;
+    world.run(1.0, |_| {});
+    world.run(20.0, |world| {
+        plan(world);
+        assert!(!world.copters[0].armed);
+    });
+    assert!(world.executors[0].detail().contains("bring it home"), "{}", world.executors[0].detail());
+    world.copters[0].position = Vector3::zeros();
+    world.until(60.0, plan, |world| world.height(0) > 3.0);
+}

@@ -91,6 +91,12 @@ impl Copter {
         Ok(())
     }
 
+    /// It forgets a take-off that it was asked for.
+    pub(super) fn hold_down(&mut self) {
+        self.climb_to = None;
+        self.setpoint = None;
+    }
+
     fn target(&mut self, setpoint: Setpoint) {
         if setpoint.position_ned_m.xy().norm() <= self.fence_m {
             self.setpoint = Some(setpoint);
