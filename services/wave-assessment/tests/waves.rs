@@ -409,5 +409,8 @@ fn the_json_lists_every_wave_and_every_line() {
     let dof = number(shape, "line_degrees_of_freedom");
     let ninth = 2.0 / (9.0 * dof);
     let bound = |z: f64| (1.0 - ninth + z * ninth.sqrt()).powi(-3);
-    assert!(dof > 5.0 && (low / bound(1.959_964) - 1.0).abs() < 0.01 && (high / bound(-1.959_964) - 1.0).abs() < 0.02, "{shape}");
+    assert!(
+        dof > 5.0 && (low / bound(1.959_964) - 1.0).abs() < 0.01 && (high / bound(-1.959_964) - 1.0).abs() < 0.02,
+        "{shape}"
+    );
 }

@@ -48,14 +48,15 @@ impl Copter {
         self.position.z < -0.3
     }
 
-    /// The pilot, or a fresh battery, or both.
+    /// The pilot, or a fresh battery, or whoever carries it home.
     pub(crate) fn meddle(&mut self, noise: &mut Noise) {
         match noise.below(6) {
             0 | 1 => self.mode = noise.of(&PILOTS),
             2 => self.mode = noise.of(&[FlightMode::Loiter, FlightMode::Land, FlightMode::Rtl, FlightMode::Auto]),
             3 => self.mode = FlightMode::Guided,
             4 => self.armed = noise.chance(0.5),
-            _ => self.battery = 95.0,
+            _ if self.flies() || self.armed => self.battery = 95.0,
+            _ => self.position = Vector3::zeros(),
         }
     }
 

@@ -539,14 +539,12 @@ impl Executor {
         if self.control.hands_off() {
             self.let_go();
             self.fail_safes.released();
-            let mode = mode_name(own.state.mode);
+            // Only a change shows from afar.
+            let anew = if own.state.mode == FlightMode::Guided { "it anew, from another mode," } else { "GUIDED" };
+            let how = format!("mode {}; set {anew} to hand back", mode_name(own.state.mode));
             match self.autopilot_fail_safe(now) {
-                Some(words) => self.set(Activity::FailSafe { reason: format!("autopilot: {words}") }, mode),
-                // Only a change shows from afar.
-                None if own.state.mode == FlightMode::Guided => {
-                    self.set(Activity::PilotControl, "mode GUIDED; set it anew, from another mode, to hand back");
-                }
-                None => self.set(Activity::PilotControl, format!("mode {mode}; set GUIDED to hand back")),
+                Some(words) => self.set(Activity::FailSafe { reason: format!("autopilot: {words}") }, how),
+                None => self.set(Activity::PilotControl, how),
             }
             return;
         }
