@@ -235,7 +235,9 @@ impl Scene {
     #[track_caller]
     fn check(&mut self, sent: &[MavMessage]) {
         let state = self.onboard.autopilot.state(self.now).map(|(state, _)| state);
-        let pilots = state.as_ref().is_some_and(|state| state.armed && PILOTS.contains(&state.mode));
+        // In whatever mode, once it was taken.
+        let is_taken = *self.onboard.executor.activity() == Activity::PilotControl;
+        let pilots = is_taken || state.as_ref().is_some_and(|state| state.armed && PILOTS.contains(&state.mode));
         let asked = |wanted: &dyn Fn(&Command) -> bool| self.asked.iter().any(|(_, command)| wanted(command));
         for message in sent {
             assert_eq!(message.target_system_id(), Some(SYSTEM), "{message:?}");
