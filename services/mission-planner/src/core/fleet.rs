@@ -173,7 +173,7 @@ impl Fleet {
         }
         match (&state.activity, state.landed) {
             (Activity::FailSafe { reason }, _) => Some(format!("in a fail-safe: {reason}")),
-            (Activity::PilotControl, _) => Some("flown by its pilot".into()),
+            (Activity::PilotControl, _) => Some("its pilot has it: set GUIDED to hand it back".into()),
             (_, LandedState::OnGround) if !state.ready_to_arm => Some("not ready to arm".into()),
             (_, LandedState::OnGround) => away_from_home(state, named, config),
             (Activity::Idle | Activity::Holding { .. }, LandedState::InAir) => None,
