@@ -5,7 +5,11 @@
 //! take 1 ms at most. "One pass over the window" is what no way to assess a whole window can be below: its gauges' readings, added up once.
 
 #![allow(missing_docs, reason = "criterion's macros make functions without any")]
-#![allow(clippy::unwrap_used, reason = "a bench that cannot run says why and ends")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a bench that cannot run says why and ends, and shows its figures"
+)]
 
 use std::hint::black_box;
 use std::time::Duration;

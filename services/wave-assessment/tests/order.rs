@@ -1,5 +1,5 @@
 //! The same patches in another order, and the same patches after another life: nothing that is kept between them may tell.
-#![allow(clippy::unwrap_used, reason = "a test may fail")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test may fail")]
 
 mod support;
 
