@@ -26,7 +26,7 @@ lab: build samples ## the thesis's tables and figures, its values beside ours: l
 
 bench: build samples ## speed and exactness beside OpenCV, then each step of the chain by criterion
 	target/debug/halcyon bench
-	cargo bench --profile dev --workspace --bench chain --bench waves --bench guidance
+	cargo bench --profile dev --workspace --bench chain --bench waves --bench guidance --bench patch
 
 lint: setup ## formatting, clippy and types
 	cargo fmt --all --check

@@ -41,52 +41,99 @@ impl Wave {
 /// with n samples a wave.
 #[must_use]
 pub fn waves(record: &Record, crossing: Crossing, deadband_m: f64) -> Vec<Wave> {
+    let [found] = waves_beyond(record, crossing, [deadband_m]);
+    found
+}
+
+/// The same for several dead bands, in one pass over the record.
+#[must_use]
+pub fn waves_beyond<const N: usize>(record: &Record, crossing: Crossing, deadbands_m: [f64; N]) -> [Vec<Wave>; N] {
     // A down-crossing of η is an up-crossing of −η.
     let sign = match crossing {
         Crossing::Up => 1.0,
         Crossing::Down => -1.0,
     };
-    let samples = record.samples_m();
-    let crossings = up_crossings(samples, sign, deadband_m.max(0.0));
-    crossings
-        .windows(2)
-        .filter_map(|pair| {
-            let inside = samples.get(pair[0].ceil() as usize..=pair[1].floor() as usize)?;
-            let (trough_m, crest_m) =
-                inside.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &x| (low.min(x), high.max(x)));
-            Some(Wave {
-                start_s: pair[0] / record.rate_hz(),
-                period_s: (pair[1] - pair[0]) / record.rate_hz(),
-                crest_m,
-                trough_m,
-            })
-        })
-        .collect()
+    let (before, rises) = rises(record.samples_m(), sign);
+    deadbands_m.map(|deadband_m| joined(&before, &rises, deadband_m.max(0.0), sign, record.rate_hz()))
 }
 
-/// Instants, in samples, where `sign` × `samples` rises from under −`deadband` to above it.
-fn up_crossings(samples: &[f64], sign: f64, deadband: f64) -> Vec<f64> {
-    let mut instants = Vec::new();
-    // The last sample that was not zero, and the last rise through zero since the surface was under the dead band.
-    let mut last: Option<(usize, f64)> = None;
-    let mut rise: Option<f64> = None;
-    let mut below = false;
-    for (i, x) in samples.iter().map(|x| sign * x).enumerate().filter(|(_, x)| *x != 0.0) {
-        if let Some((j, y)) = last
-            && y < 0.0
-            && x > 0.0
-        {
-            rise = Some(if j + 1 == i { j as f64 + y / (y - x) } else { (j + 1) as f64 });
-        }
-        if x < -deadband {
-            below = true;
-        } else if x > deadband && below {
-            below = false;
-            instants.extend(rise);
-        }
-        last = Some((i, x));
+/// What the surface does between two rises through zero, or before the first.
+struct Rise {
+    /// Instant of the rise, samples.
+    at: f64,
+    /// Highest and lowest sample, metres.
+    high_m: f64,
+    low_m: f64,
+}
+
+impl Rise {
+    fn new(at: f64) -> Self {
+        Self { at, high_m: f64::NEG_INFINITY, low_m: f64::INFINITY }
     }
-    instants
+}
+
+/// What comes before the first rise of `sign` × `samples` through zero, and every rise.
+fn rises(samples: &[f64], sign: f64) -> (Rise, Vec<Rise>) {
+    let mut rises = Vec::new();
+    let (mut before, mut current) = (None, Rise::new(0.0));
+    // The last sample that was not zero.
+    let mut last: (usize, f64) = (0, 0.0);
+    // Samples on one side of zero, run by run.
+    let mut start = 0;
+    while let Some(first) = samples.get(start).map(|x| sign * x) {
+        let rest = &samples[start..];
+        let length = |is: &dyn Fn(f64) -> bool| rest.iter().position(|x| !is(sign * x)).unwrap_or(rest.len());
+        let extreme = |run: &[f64], more: fn(f64, f64) -> f64| run.iter().fold(first, |found, x| more(found, sign * x));
+        let end = if first > 0.0 {
+            let (j, y) = last;
+            if y < 0.0 {
+                let at = if j + 1 == start { j as f64 + y / (y - first) } else { (j + 1) as f64 };
+                let ended = std::mem::replace(&mut current, Rise::new(at));
+                if before.is_none() { before = Some(ended) } else { rises.push(ended) }
+            }
+            let count = length(&|x| x > 0.0);
+            current.high_m = current.high_m.max(extreme(&rest[..count], f64::max));
+            start + count
+        } else if first < 0.0 {
+            let count = length(&|x| x < 0.0);
+            current.low_m = current.low_m.min(extreme(&rest[..count], f64::min));
+            start + count
+        } else {
+            start += 1;
+            continue;
+        };
+        last = (end - 1, sign * samples[end - 1]);
+        start = end;
+    }
+    match before {
+        Some(before) => {
+            rises.push(current);
+            (before, rises)
+        }
+        None => (current, rises),
+    }
+}
+
+/// Waves from the rises that count with a dead band: those after which the surface comes above it, having been under it since the one before.
+fn joined(before: &Rise, rises: &[Rise], deadband_m: f64, sign: f64, rate_hz: f64) -> Vec<Wave> {
+    let mut waves = Vec::with_capacity(rises.len());
+    let mut below = before.low_m < -deadband_m;
+    let mut current: Option<Rise> = None;
+    for rise in rises {
+        if below && rise.high_m > deadband_m {
+            below = false;
+            if let Some(wave) = current.replace(Rise::new(rise.at)) {
+                // Of −η crests are troughs.
+                let (trough_m, crest_m) = if sign > 0.0 { (wave.low_m, wave.high_m) } else { (-wave.high_m, -wave.low_m) };
+                waves.push(Wave { start_s: wave.at / rate_hz, period_s: (rise.at - wave.at) / rate_hz, crest_m, trough_m });
+            }
+        }
+        below |= rise.low_m < -deadband_m;
+        if let Some(wave) = &mut current {
+            (wave.high_m, wave.low_m) = (wave.high_m.max(rise.high_m), wave.low_m.min(rise.low_m));
+        }
+    }
+    waves
 }
 
 /// Statistics of a set of waves.
@@ -178,6 +225,51 @@ mod tests {
         let waves = waves(&saw, Crossing::Up, 0.0);
         // Crossings a quarter of the way from sample 0 and half of the way from sample 3.
         assert_eq!(waves, vec![Wave { start_s: 0.125, period_s: 1.625, crest_m: 3.0, trough_m: -1.0 }]);
+    }
+
+    /// The rule as it is stated, sample by sample.
+    fn plainly(record: &Record, crossing: Crossing, deadband: f64) -> Vec<Wave> {
+        let samples = record.samples_m();
+        let up: Vec<f64> = samples.iter().map(|x| if crossing == Crossing::Up { *x } else { -x }).collect();
+        let (mut instants, mut rise, mut below, mut last) = (Vec::new(), None, false, None::<usize>);
+        for i in (0..up.len()).filter(|i| up[*i] != 0.0) {
+            if let Some(j) = last.filter(|j| up[*j] < 0.0 && up[i] > 0.0) {
+                rise = Some(if j + 1 == i { j as f64 + up[j] / (up[j] - up[i]) } else { (j + 1) as f64 });
+            }
+            if up[i] < -deadband {
+                below = true;
+            } else if up[i] > deadband && below {
+                below = false;
+                instants.extend(rise);
+            }
+            last = Some(i);
+        }
+        let of = |pair: &[f64]| {
+            let inside = &samples[pair[0].ceil() as usize..=pair[1].floor() as usize];
+            Wave {
+                start_s: pair[0] / record.rate_hz(),
+                period_s: (pair[1] - pair[0]) / record.rate_hz(),
+                crest_m: inside.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+                trough_m: inside.iter().copied().fold(f64::INFINITY, f64::min),
+            }
+        };
+        instants.windows(2).map(of).collect()
+    }
+
+    proptest::proptest! {
+        /// Whatever the surface does, one pass for several dead bands finds what the rule says of each. Few levels, so that zeros, and samples just on
+        /// a dead band, are common.
+        #[test]
+        fn one_pass_finds_what_the_rule_says(levels in proptest::collection::vec(-4_i32..=4, 4..120), bands in (0_i32..4, 0_i32..4)) {
+            let record = Record::new(levels.iter().map(|level| 0.25 * f64::from(*level)).collect::<Vec<_>>(), 4.0).unwrap();
+            let deadbands = [0.25 * f64::from(bands.0), 0.25 * f64::from(bands.1) - 0.1];
+            for crossing in [Crossing::Up, Crossing::Down] {
+                let found = waves_beyond(&record, crossing, deadbands);
+                for (found, deadband) in found.iter().zip(deadbands) {
+                    proptest::prop_assert_eq!(found, &plainly(&record, crossing, deadband.max(0.0)));
+                }
+            }
+        }
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! Splitting a record by frequency.
 
-use realfft::RealFftPlanner;
 pub use realfft::num_complex::Complex;
 
+use crate::plans;
 use crate::record::{Record, remove_line};
 
 /// The part of `record` between `low_hz` and `high_hz`, metres, without shift in time.
@@ -38,9 +38,11 @@ impl Mirrored {
     pub fn of(record: &Record) -> Self {
         let mut middle = record.samples_m().to_vec();
         remove_line(&mut middle);
-        let mut extended: Vec<f64> = middle.iter().chain(middle.iter().rev()).copied().collect();
+        let mut extended = Vec::with_capacity(2 * middle.len());
+        extended.extend_from_slice(&middle);
+        extended.extend(middle.iter().rev());
         let df_hz = record.rate_hz() / extended.len() as f64;
-        let forward = RealFftPlanner::<f64>::new().plan_fft_forward(extended.len());
+        let forward = plans::forward(extended.len());
         let mut bins = forward.make_output_vec();
         if forward.process(&mut extended, &mut bins).is_err() {
             bins.clear();
@@ -70,7 +72,7 @@ impl Mirrored {
     #[must_use]
     pub fn rebuilt(&self, mut bins: Vec<Complex<f64>>) -> Vec<f64> {
         let length = 2 * self.middle.len();
-        let inverse = RealFftPlanner::<f64>::new().plan_fft_inverse(length);
+        let inverse = plans::inverse(length);
         bins.iter_mut().for_each(|bin| *bin /= length as f64);
         let mut extended = inverse.make_output_vec();
         // A real signal's mean and Nyquist components are real; the inverse insists on it.

@@ -3,6 +3,8 @@
 //! A narrow-band Gaussian sea has Rayleigh-distributed heights (Longuet-Higgins, 1952). Real, broader seas have somewhat lower
 //! ones (H_1/3 is about 3.8 √m0 rather than 4.004 √m0), so these are on the careful side.
 
+use std::sync::LazyLock;
+
 /// H_1/3 over √m0: 2 √2 (√ln 3 + 3 ∫ exp(−x²) dx from √ln 3) = 4.004….
 pub const H_S_OVER_ROOT_M0: f64 = 4.004_302_95;
 /// H_m over √m0: √(2π).
@@ -13,6 +15,15 @@ pub const H_RMS_OVER_ROOT_M0: f64 = 2.828_427_124_746_190_3;
 /// H_1/10 over √m0: √8 (√ln 10 + 10 × ∫ exp(−x²) dx from √ln 10) = 5.09….
 pub const H_TENTH_OVER_ROOT_M0: f64 = 5.090_937_09;
 
+/// Steps of the integral over the highest wave: n exp(−x²) is under 1e-8 at the end even for the most waves; midpoint rule on a smooth integrand.
+const STEPS: u32 = 500;
+const STEP: f64 = 7.0 / STEPS as f64;
+/// ln(1 − exp(−x²)) at the middle of each step: the same for any number of waves.
+static LOWER: LazyLock<Vec<f64>> = LazyLock::new(|| {
+    let logarithm = |x: f64| (-(-x * x).exp()).ln_1p();
+    (0..STEPS).map(|i| logarithm((f64::from(i) + 0.5) * STEP)).collect()
+});
+
 /// Expected highest of `waves` successive waves, over H_s.
 ///
 /// The exact mean of the highest of n Rayleigh heights, E[H_max]/H_rms = ∫ 1 − (1 − exp(−x²))ⁿ dx, for any real n; less than one
@@ -22,17 +33,8 @@ pub fn expected_highest_over_h_s(waves: f64) -> f64 {
     const WAVES_MAX: f64 = 1e12;
     // NaN must not come out as calm: `min` and `max` would drop it silently.
     let n = if waves.is_nan() { WAVES_MAX } else { waves.clamp(1.0, WAVES_MAX) };
-    // n exp(−x²) is under 1e-8 at the end even for the most waves; midpoint rule on a smooth integrand.
-    const STEPS: u32 = 500;
-    const END: f64 = 7.0;
-    let step = END / f64::from(STEPS);
-    let over_rms: f64 = (0..STEPS)
-        .map(|i| {
-            let x = (f64::from(i) + 0.5) * step;
-            // (1 − e)ⁿ without cancellation for small e.
-            -(n * (-(-x * x).exp()).ln_1p()).exp_m1() * step
-        })
-        .sum();
+    // (1 − e)ⁿ without cancellation for small e.
+    let over_rms: f64 = LOWER.iter().map(|logarithm| -(n * logarithm).exp_m1() * STEP).sum();
     over_rms * H_RMS_OVER_ROOT_M0 / H_S_OVER_ROOT_M0
 }
 

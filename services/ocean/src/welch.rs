@@ -1,7 +1,12 @@
 //! Variance density spectra of records by Welch's method, and wave statistics from spectra.
 
+use std::fmt;
+use std::sync::Arc;
+
+use realfft::RealToComplex;
+
 use crate::dispersion::GRAVITY_MPS2;
-use realfft::RealFftPlanner;
+use crate::plans;
 
 use crate::record::{Record, RecordError, mean};
 
@@ -66,15 +71,56 @@ impl Welch {
     /// # Errors
     /// As [`Self::spectrum`].
     pub fn spectrum_padded(&self, record: &Record, transform_samples: usize) -> Result<SampledSpectrum, RecordError> {
+        // What is no spectrum needs no plan.
+        fill(self.segment_samples, record.samples_m())?;
+        self.planned(transform_samples).spectrum(record)
+    }
+
+    /// What the spectra of all records share, with segments followed by zeros up to `transform_samples`: planned once for many records.
+    #[must_use]
+    pub fn planned(&self, transform_samples: usize) -> Segments {
         let n = self.segment_samples;
+        let taper: Vec<f64> = (0..n).map(|i| self.taper.at(i as f64 / n as f64)).collect();
+        let fft = plans::forward(transform_samples.max(n).max(1));
+        Segments { power: taper.iter().map(|w| w * w).sum(), taper, fft }
+    }
+}
+
+/// Whether `samples` fill a segment of so many, and that is one.
+fn fill(segment_samples: usize, samples: &[f64]) -> Result<(), RecordError> {
+    let samples_min = segment_samples.max(Record::SAMPLES_MIN);
+    if segment_samples < Record::SAMPLES_MIN || samples.len() < segment_samples {
+        return Err(RecordError::TooShort { samples: samples.len(), samples_min });
+    }
+    Ok(())
+}
+
+/// A taper and a transform for segments of one length.
+#[derive(Clone)]
+pub struct Segments {
+    taper: Vec<f64>,
+    /// Sum of the taper's squares.
+    power: f64,
+    fft: Arc<dyn RealToComplex<f64>>,
+}
+
+impl fmt::Debug for Segments {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.debug_struct("Segments").field("samples", &self.taper.len()).finish_non_exhaustive()
+    }
+}
+
+impl Segments {
+    /// The spectrum of `record`, as [`Welch::spectrum_padded`] has it.
+    ///
+    /// # Errors
+    /// [`RecordError::TooShort`] where the record is shorter than one segment or a segment shorter than four samples.
+    pub fn spectrum(&self, record: &Record) -> Result<SampledSpectrum, RecordError> {
+        let n = self.taper.len();
         let samples = record.samples_m();
-        if n < Record::SAMPLES_MIN || samples.len() < n {
-            return Err(RecordError::TooShort { samples: samples.len(), samples_min: n.max(Record::SAMPLES_MIN) });
-        }
-        let window: Vec<f64> = (0..n).map(|i| self.taper.at(i as f64 / n as f64)).collect();
-        let window_power: f64 = window.iter().map(|w| w * w).sum();
-        let lines = transform_samples.max(n);
-        let fft = RealFftPlanner::<f64>::new().plan_fft_forward(lines);
+        fill(n, samples)?;
+        let fft = &self.fft;
+        let lines = fft.len();
         let (mut input, mut output, mut scratch) = (fft.make_input_vec(), fft.make_output_vec(), fft.make_scratch_vec());
         let mut density = vec![0.0; output.len()];
         let mut segments = 0_usize;
@@ -82,7 +128,7 @@ impl Welch {
             let level = mean(segment);
             // The transform leaves its input changed.
             input.fill(0.0);
-            for ((x, sample), w) in input.iter_mut().zip(segment).zip(&window) {
+            for ((x, sample), w) in input.iter_mut().zip(segment).zip(&self.taper) {
                 *x = (sample - level) * w;
             }
             // The lengths come from the plan itself, the only thing this could complain about.
@@ -93,7 +139,7 @@ impl Welch {
             segments += 1;
         }
         // One-sided: all but the mean and, for an even length, the Nyquist frequency count twice.
-        let scale = 1.0 / (record.rate_hz() * window_power * segments as f64);
+        let scale = 1.0 / (record.rate_hz() * self.power * segments as f64);
         let last = density.len() - 1;
         for (i, d) in density.iter_mut().enumerate() {
             let sides = if i == 0 || (i == last && lines.is_multiple_of(2)) { 1.0 } else { 2.0 };

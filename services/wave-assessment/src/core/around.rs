@@ -1,14 +1,15 @@
-//! What takes whole grids or long records to find: where waves come from, the next quiet moments, and what a second witness says.
+//! What takes whole grids or long records to find: where waves come from, the next quiet moments, the rotors' ripples, and what a second witness says.
 //!
 //! It takes tens of milliseconds, far more than a patch may take, and no verdict is safe for it. So it is looked for apart: a [`Glance`] is a copy
 //! of all it needs and can be taken anywhere, on any thread; what it finds goes into the sea states that follow.
 
-use halcyon_model::{CalmForecast, Directional, LocalPoint, Stamp};
+use halcyon_model::{CalmForecast, Directional, LocalPoint, QualityFlag, Stamp};
 
 use super::ahead::calm;
 use super::direction::directional;
 use super::film::film;
 use super::hidden::hidden;
+use super::quality;
 use super::series::Series;
 use super::statistics::Statistics;
 use super::window::Window;
@@ -23,6 +24,8 @@ const CALM_PERIOD_S: f64 = 1.0;
 const CALM_AGE_S_MAX: f64 = 3.0;
 /// And directions.
 const DIRECTIONS_AGE_S_MAX: f64 = 30.0;
+/// And rotors' ripples.
+const RINGS_AGE_S_MAX: f64 = 15.0;
 /// And what the witness said.
 const TESTIMONY_AGE_S_MAX: f64 = 15.0;
 
@@ -36,6 +39,8 @@ pub struct Around {
     directional: Option<Directional>,
     calm: Option<CalmForecast>,
     testimony: Option<Testimony>,
+    /// Rotors' ripples, of the same time as the directions.
+    rings: Option<QualityFlag>,
     /// Which filling of the window it is of.
     filling: u64,
 }
@@ -51,6 +56,11 @@ impl Around {
     pub(super) fn calm(&self, newest: Stamp) -> Option<CalmForecast> {
         let is_fresh = newest.seconds_since(self.at) <= CALM_AGE_S_MAX;
         self.calm.clone().filter(|_| is_fresh)
+    }
+
+    /// Rotors' ripples, unless they were seen long ago.
+    pub(super) fn rings(&self, newest: Stamp) -> Option<&QualityFlag> {
+        self.rings.as_ref().filter(|_| newest.seconds_since(self.directions_at) <= RINGS_AGE_S_MAX)
     }
 
     /// What the witness says, unless it is of long ago.
@@ -114,16 +124,16 @@ impl Glance {
     #[must_use]
     pub fn look(self) -> Around {
         let is_fresh = |last: &&Around| (0.0..DIRECTIONS_PERIOD_S).contains(&self.at.seconds_since(last.directions_at));
-        let (directional, testimony, directions_at) = match self.last.as_ref().filter(is_fresh) {
-            Some(last) => (last.directional, last.testimony.clone(), last.directions_at),
-            None => (self.directions(), self.testimony(), self.at),
+        let (directional, testimony, rings, directions_at) = match self.last.as_ref().filter(is_fresh) {
+            Some(last) => (last.directional, last.testimony.clone(), last.rings.clone(), last.directions_at),
+            None => (self.directions(), self.testimony(), quality::downwash(&self.window), self.at),
         };
         let spectral = self.statistics.as_ref().and_then(|statistics| statistics.spectral.as_ref());
         let calm = spectral
             .zip(directional.as_ref())
             .filter(|_| self.is_trusted)
             .and_then(|(spectral, directional)| calm(&self.window, spectral, directional, self.place, &self.config));
-        Around { at: self.at, directions_at, directional, calm, testimony, filling: self.filling }
+        Around { at: self.at, directions_at, directional, calm, testimony, rings, filling: self.filling }
     }
 
     /// Without waves above the noise there are none.

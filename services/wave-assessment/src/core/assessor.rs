@@ -1,7 +1,7 @@
 //! From patch to sea state.
 
 use halcyon_model::{
-    IdError, LocalPoint, QualityFlag, RigId, SeaState, Stamp, SurfacePatch, VehicleState, Verdict, VerdictReason, VerdictState,
+    IdError, LocalPoint, RigId, SeaState, Stamp, SurfacePatch, VehicleState, Verdict, VerdictReason, VerdictState,
 };
 
 use super::around::{Around, Glance};
@@ -30,15 +30,10 @@ pub struct Assessor {
     /// What the last sea state rests on, and whether it could be trusted.
     statistics: Option<Statistics>,
     is_trusted: bool,
-    /// Rotor ripples, and patch time of when they were looked for.
-    ripples: Option<(Stamp, Option<QualityFlag>)>,
     around: Option<Around>,
     /// Counts how often the window was filled anew.
     filling: u64,
 }
-
-/// Rotor ripples are looked for once in so many seconds of patch time.
-const RIPPLES_PERIOD_S: f64 = 5.0;
 
 impl Assessor {
     /// An assessor that has seen nothing.
@@ -58,7 +53,6 @@ impl Assessor {
             verdict,
             statistics: None,
             is_trusted: false,
-            ripples: None,
             around: None,
             filling: 0,
         })
@@ -182,18 +176,8 @@ impl Assessor {
         self.issued = None;
         self.verdict = VerdictState::Inconclusive;
         self.statistics = None;
-        self.ripples = None;
         self.around = None;
         self.filling += 1;
-    }
-
-    /// Rotor ripples, looked for anew if it is time.
-    fn ripples(&mut self, newest: Stamp) -> Option<QualityFlag> {
-        let is_fresh = |at: &Stamp| (0.0..RIPPLES_PERIOD_S).contains(&newest.seconds_since(*at));
-        if !self.ripples.as_ref().is_some_and(|(at, _)| is_fresh(at)) {
-            self.ripples = Some((newest, quality::downwash(&self.window)));
-        }
-        self.ripples.as_ref().and_then(|(_, found)| found.clone())
     }
 
     fn assess(&mut self, now: Stamp) -> Option<SeaState> {
@@ -209,9 +193,7 @@ impl Assessor {
             (hidden, series, statistics)
         });
         let (hidden, series, statistics) = measured.map_or((None, None, None), |(h, s, t)| (Some(h), Some(s), t));
-        let rings = self.ripples(newest);
-        let frames = self.window.frames();
-        let mean = |f: &dyn Fn(&super::window::Frame) -> f64| frames.iter().map(f).sum::<f64>() / frames.len() as f64;
+        let rings = self.around.as_ref().and_then(|around| around.rings(newest)).cloned();
         let evidence = Evidence {
             observed_s: series.as_ref().map_or(0.0, |s| s.observed_s),
             coverage: mean(&|f| f.coverage),

@@ -2,6 +2,7 @@
 
 use halcyon_model::{ElevationGrid, LocalPoint, SurfacePatch};
 
+use super::correlation::Correlation;
 use super::patch::cell;
 use super::smooth::{SMOOTHINGS, Smoother};
 
@@ -52,13 +53,19 @@ struct Gauge {
 pub(crate) struct Gauges {
     placed: [Option<Gauge>; GAUGES],
     next: u64,
+    /// Of the cells of the last patch.
+    correlation: Option<Correlation>,
 }
 
 impl Gauges {
     /// Reads every gauge from `patch`.
     pub(crate) fn read(&mut self, patch: &SurfacePatch) -> [Option<Reading>; GAUGES] {
         let grid = &patch.grid;
-        let smoother = Smoother::new(patch);
+        let correlation = match self.correlation.take() {
+            Some(correlation) if correlation.is_of(patch) => correlation,
+            _ => Correlation::new(grid.cell_m, patch.error_length_m),
+        };
+        let smoother = Smoother::new(patch, &correlation);
         let mut readings = [None; GAUGES];
         for (slot, reading) in readings.iter_mut().enumerate() {
             let gauge = match self.placed[slot] {
@@ -77,6 +84,7 @@ impl Gauges {
             let misses = if seen.is_some() { 0 } else { gauge.misses + 1 };
             self.placed[slot] = Some(Gauge { misses, ..gauge });
         }
+        self.correlation = Some(correlation);
         readings
     }
 }

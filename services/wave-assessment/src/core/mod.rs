@@ -7,7 +7,7 @@
 //! | window | the frames of the last while over the same spot |
 //! | series | one gauge's elevation over the window, broken where patches are missing |
 //! | film | the window's grids over one piece of water, for directions |
-//! | glance | a look around, apart from the patches: directions, quiet moments, the witness |
+//! | glance | a look around, apart from the patches: directions, quiet moments, rotors' ripples, the witness |
 //! | witness | the rig's rangefinder, which has to see the same waves |
 //! | hidden part | waves longer than the footprint: a patch's own mean level takes them out of its grid |
 //!
@@ -16,12 +16,17 @@
 mod ahead;
 mod around;
 mod assessor;
+mod correlation;
 mod direction;
 mod film;
 mod gauge;
 mod hidden;
+mod moments;
+#[cfg(test)]
+mod oracle;
 mod patch;
 mod quality;
+mod records;
 mod sampling;
 mod series;
 mod smooth;

@@ -1,6 +1,5 @@
 //! How much a finite window can tell: degrees of freedom of the pooled variance.
 
-use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
 
 use super::gauge::{GAUGES, SIDE};
@@ -39,26 +38,23 @@ pub(crate) fn degrees_of_freedom(series: &Series, interval_s: f64, period_s: Opt
     if !used.iter().any(|gauge| gauge.varies) || lag_max == 0 || lag_max >= length {
         return None;
     }
-    let mut pairs: BTreeMap<Separation, Vec<[&Gauge; 2]>> = BTreeMap::new();
+    let mut pairs: [Vec<[&Gauge; 2]>; SEPARATIONS] = Default::default();
     for (a, b) in used.iter().flat_map(|a| used.iter().map(move |b| (a, b))) {
-        pairs.entry(separation(a, b)).or_default().push([a, b]);
+        pairs[separation(a, b)].push([a, b]);
     }
-    let squares: BTreeMap<Separation, Squares> =
-        pairs.iter().map(|(apart, of)| (*apart, Squares::of(of, lag_max, length))).collect();
-    let of = |a: &Gauge, b: &Gauge| squares.get(&separation(a, b)).copied().unwrap_or_default();
+    let squares = squares(&used, lag_max, length);
     // Mean of what spoils the squares, over all pairs of some gauges.
     let noise = |some: &[[&Gauge; 2]]| {
-        let each = some.iter().map(|[a, _]| some.iter().map(|[b, _]| of(a, b).signs).sum::<f64>());
+        let each = some.iter().map(|[a, _]| some.iter().map(|[b, _]| squares[separation(a, b)].signs).sum::<f64>());
         each.sum::<f64>() / (some.len() * some.len()) as f64
     };
     let lags = 2.0 * lag_max as f64 * interval_s / duration_s;
-    let unspoilt = |(apart, some): (&Separation, &Vec<[&Gauge; 2]>)| {
-        let found = squares.get(apart).map_or(0.0, |squares| squares.waves);
-        some.len() as f64 * (found - lags / (1.0 + lags) * noise(some))
-    };
+    let unspoilt =
+        |(some, found): (&Vec<[&Gauge; 2]>, &Squares)| some.len() as f64 * (found.waves - lags / (1.0 + lags) * noise(some));
     let scale = 2.0 * interval_s / duration_s;
-    let all = pairs.iter().map(unspoilt).sum::<f64>() * scale / (gauges * gauges);
-    let own = squares.get(&(0, 0))?.waves / (1.0 + lags) * scale;
+    let apart = pairs.iter().zip(&squares).filter(|(some, _)| !some.is_empty());
+    let all = apart.map(unspoilt).sum::<f64>() * scale / (gauges * gauges);
+    let own = squares[NOWHERE].waves / (1.0 + lags) * scale;
     // A window whose waves forget each other sooner than those of a wind sea does so by chance.
     let wider = (JONSWAP * period_s.unwrap_or(0.0) / duration_s / own).max(1.0);
     // No better than gauges that know nothing of each other, no worse than one.
@@ -67,11 +63,16 @@ pub(crate) fn degrees_of_freedom(series: &Series, interval_s: f64, period_s: Opt
     Some(freedom * freedom / (freedom + UNCLAIMED))
 }
 
-/// How many places of the layout one gauge lies from another, along its rows and columns.
-type Separation = (isize, isize);
+/// How many different ways one gauge can lie from another: places of the layout along its rows, and along its columns.
+const SEPARATIONS: usize = ACROSS * ACROSS;
+const ACROSS: usize = 2 * SIDE - 1;
+/// A gauge from itself.
+const NOWHERE: usize = SEPARATIONS / 2;
 
-fn separation(a: &Gauge, b: &Gauge) -> Separation {
-    (b.place.0 - a.place.0, b.place.1 - a.place.1)
+/// The number of the way in which b lies from a.
+fn separation(a: &Gauge, b: &Gauge) -> usize {
+    let along = |from: usize, to: usize| to + SIDE - 1 - from;
+    along(a.place.0, b.place.0) * ACROSS + along(a.place.1, b.place.1)
 }
 
 /// Each gauge's elevation at 0, 1, 2 … intervals since the window began; NaN where there is none. And how many intervals.
@@ -92,7 +93,7 @@ fn table(series: &Series, interval_s: f64) -> ([Option<Vec<f64>>; GAUGES], usize
 
 /// Where one gauge's elevations are known, and where they are above the mean level; its place in the layout.
 struct Gauge {
-    place: (isize, isize),
+    place: (usize, usize),
     varies: bool,
     known: Vec<u64>,
     above: Vec<u64>,
@@ -100,39 +101,64 @@ struct Gauge {
 
 impl Gauge {
     fn of(slot: usize, elevation_m: &[f64]) -> Self {
-        let bits = |is: fn(f64) -> bool| -> Vec<u64> {
-            let word = |of: &[f64]| of.iter().rev().fold(0, |word, x| (word << 1) | u64::from(is(*x)));
-            elevation_m.chunks(BITS).map(word).collect()
-        };
         Self {
-            place: ((slot / SIDE) as isize, (slot % SIDE) as isize),
+            place: (slot / SIDE, slot % SIDE),
             varies: elevation_m.iter().any(|x| x.abs() > 0.0),
-            known: bits(|x| !x.is_nan()),
-            above: bits(|x| x > 0.0),
+            known: bits(elevation_m, |x| !x.is_nan()),
+            above: bits(elevation_m, |x| x > 0.0),
         }
     }
+}
+
+/// Which values are so, 64 to a word.
+fn bits(values: &[f64], is: impl Fn(f64) -> bool) -> Vec<u64> {
+    let word = |of: &[f64]| of.iter().rev().fold(0, |word, x| (word << 1) | u64::from(is(*x)));
+    values.chunks(BITS).map(word).collect()
 }
 
 const BITS: usize = u64::BITS as usize;
 
-/// Word `i` of what comes `lag` later.
-fn later(words: &[u64], i: usize, lag: usize) -> u64 {
-    let (at, by) = (i + lag / BITS, lag % BITS);
-    let word = |at: usize| words.get(at).copied().unwrap_or(0);
-    if by == 0 { word(at) } else { (word(at) >> by) | (word(at + 1) << (BITS - by)) }
+/// All words of what comes `lag` later, into `found`.
+fn later(words: &[u64], lag: usize, found: &mut Vec<u64>) {
+    let (skipped, by) = (lag / BITS, lag % BITS);
+    let rest = words.get(skipped..).unwrap_or_default();
+    found.clear();
+    found.extend_from_slice(rest);
+    if by > 0 {
+        found.iter_mut().for_each(|word| *word >>= by);
+        let next = rest.get(1..).unwrap_or_default();
+        found.iter_mut().zip(next).for_each(|(word, next)| *word |= next << (BITS - by));
+    }
 }
 
-/// Correlation of the signs of a(t) and b(t + lag) over all pairs where both are known.
-fn correlation(pairs: &[[&Gauge; 2]], lag: usize) -> f64 {
-    let (mut known, mut unlike) = (0, 0);
-    for [a, b] in pairs {
-        for (i, (k, s)) in a.known.iter().zip(&a.above).enumerate() {
-            let both = k & later(&b.known, i, lag);
-            known += both.count_ones();
-            unlike += (both & (s ^ later(&b.above, i, lag))).count_ones();
+/// How often two gauges' signs are both known, and then differ.
+#[derive(Clone, Copy, Default)]
+struct Count {
+    known: u64,
+    unlike: u64,
+}
+
+/// Those of all pairs of gauges, the second `lag` later, by the way in which the two lie. Compiled for processors that count bits, too: nothing else
+/// takes as long here.
+#[multiversion::multiversion(targets("x86_64+avx2+popcnt", "x86_64+popcnt"))]
+fn counts(gauges: &[Gauge], lag: usize) -> [Count; SEPARATIONS] {
+    let mut counts = [Count::default(); SEPARATIONS];
+    let (mut known, mut above) = (Vec::new(), Vec::new());
+    for b in gauges {
+        later(&b.known, lag, &mut known);
+        later(&b.above, lag, &mut above);
+        for a in gauges {
+            let mut count = Count::default();
+            for ((k, s), (l, t)) in a.known.iter().zip(&a.above).zip(known.iter().zip(&above)) {
+                let both = k & l;
+                count.known += u64::from(both.count_ones());
+                count.unlike += u64::from((both & (s ^ t)).count_ones());
+            }
+            let sum = &mut counts[separation(a, b)];
+            (sum.known, sum.unlike) = (sum.known + count.known, sum.unlike + count.unlike);
         }
     }
-    if known > 0 { 1.0 - 2.0 * f64::from(unlike) / f64::from(known) } else { 0.0 }
+    counts
 }
 
 /// Sums over all lags, before and after: of the squared correlation of the waves, and of that of their signs, times (π/2)².
@@ -142,13 +168,19 @@ struct Squares {
     signs: f64,
 }
 
-impl Squares {
-    fn of(pairs: &[[&Gauge; 2]], lag_max: usize, length: usize) -> Self {
-        (0..=lag_max).fold(Self::default(), |sum, lag| {
-            let angle = FRAC_PI_2 * correlation(pairs, lag);
-            // Far lags are weighted down, so that they do not run wild.
-            let weight = (1.0 - lag as f64 / length as f64).powi(2) * if lag == 0 { 1.0 } else { 2.0 };
-            Self { waves: sum.waves + weight * angle.sin().powi(2), signs: sum.signs + weight * angle.powi(2) }
-        })
+/// Those of all pairs of gauges that lie in each way from each other.
+fn squares(gauges: &[Gauge], lag_max: usize, length: usize) -> [Squares; SEPARATIONS] {
+    let mut squares = [Squares::default(); SEPARATIONS];
+    for lag in 0..=lag_max {
+        // Far lags are weighted down, so that they do not run wild.
+        let weight = (1.0 - lag as f64 / length as f64).powi(2) * if lag == 0 { 1.0 } else { 2.0 };
+        for (sum, Count { known, unlike }) in squares.iter_mut().zip(counts(gauges, lag)) {
+            // Correlation of the signs of a(t) and b(t + lag) over all pairs where both are known.
+            let correlation = if known > 0 { 1.0 - 2.0 * unlike as f64 / known as f64 } else { 0.0 };
+            let angle = FRAC_PI_2 * correlation;
+            sum.waves += weight * angle.sin().powi(2);
+            sum.signs += weight * angle.powi(2);
+        }
     }
+    squares
 }

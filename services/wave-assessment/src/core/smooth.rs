@@ -4,41 +4,70 @@
 //! fraction of the noise: the less, the larger the disc. Which disc loses no waves that are there is for the series to judge, which has
 //! all of them.
 
-use halcyon_model::{ElevationGrid, LocalPoint, SurfacePatch, grid_error};
-use nalgebra::{Matrix6, Vector6};
+use halcyon_model::{ElevationGrid, LocalPoint, SurfacePatch};
+use nalgebra::Vector6;
 
+use super::correlation::{Correlation, SPAN};
 use super::gauge::Sample;
+use super::moments::{Moments, powers};
 use super::patch::cell;
 
 /// Radii of the discs over the shorter side of the patch. The first keeps chop, the second all that is longer than the patch.
 const RADIUS_SHARES: [f64; 2] = [0.12, 0.30];
 /// Readings of one place: the cell, and each disc.
 pub(crate) const SMOOTHINGS: usize = 1 + RADIUS_SHARES.len();
+/// More cells than this are not looked at, along the radius: finer cells bring no more.
+const RADIUS_CELLS_MAX: f64 = (SPAN / 2) as f64;
 /// A disc of fewer cells smooths nothing.
 const CELLS_MIN: usize = 13;
-/// More cells than this are not looked at, along the radius: finer cells bring no more.
-const RADIUS_CELLS_MAX: f64 = 9.0;
-/// Cells across the largest disc.
-const SPAN: usize = 2 * RADIUS_CELLS_MAX as usize + 1;
+/// What smoothing takes out of one frame's readings: kept with the frame, so that a window only adds them up.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct Smoothed {
+    /// How many readings.
+    pub readings: f64,
+    /// By each disc.
+    pub taken: [Taken; RADIUS_SHARES.len()],
+}
+
+/// Sums over readings of what one disc takes out.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct Taken {
+    /// Of the squares, m².
+    pub square_m2: f64,
+    /// What the matcher's noise explains of them, m².
+    pub explained_m2: f64,
+}
+
+impl Smoothed {
+    /// Of a frame's readings.
+    pub(super) fn of<'a>(readings: impl Iterator<Item = &'a [Sample; SMOOTHINGS]>) -> Self {
+        let mut all = Self::default();
+        for samples in readings {
+            all.readings += 1.0;
+            for (taken, sample) in all.taken.iter_mut().zip(&samples[1..]) {
+                taken.square_m2 += (samples[0].elevation_m - sample.elevation_m).powi(2);
+                taken.explained_m2 += samples[0].noise_m2 - sample.noise_m2;
+            }
+        }
+        all
+    }
+}
 
 /// Smooths one grid.
 pub(super) struct Smoother<'a> {
     grid: &'a ElevationGrid,
     radii_cells: [f64; RADIUS_SHARES.len()],
-    /// Correlation of two cells' errors by their distance along one axis, cells.
-    correlation: Vec<f64>,
+    /// Correlation of the errors of two cells along one axis, by their places.
+    correlation: &'a Correlation,
     errors: CellErrors,
 }
 
 impl<'a> Smoother<'a> {
-    /// For the grid of `patch`.
-    pub(super) fn new(patch: &'a SurfacePatch) -> Self {
+    /// For the grid of `patch`, whose errors have this `correlation`.
+    pub(super) fn new(patch: &'a SurfacePatch, correlation: &'a Correlation) -> Self {
         let grid = &patch.grid;
         let shorter_cells = f64::from(grid.rows.min(grid.cols) - 1);
         let radii_cells = RADIUS_SHARES.map(|share| (share * shorter_cells).min(RADIUS_CELLS_MAX));
-        let covariance = |lag: usize| grid_error::covariance(lag as f64 * grid.cell_m, grid.cell_m, patch.error_length_m);
-        let own = covariance(0);
-        let correlation = (0..=2 * RADIUS_CELLS_MAX as usize).map(|lag| covariance(lag) / own).collect();
         Self { grid, radii_cells, correlation, errors: CellErrors::of(patch) }
     }
 
@@ -69,70 +98,51 @@ impl<'a> Smoother<'a> {
             let last = f64::from(end - 1);
             ((at - radius_cells).ceil().clamp(0.0, last) as usize)..=((at + radius_cells).floor().clamp(0.0, last) as usize)
         };
-        let mut cells: Vec<DiscCell> = Vec::new();
-        let mut normal = Matrix6::<f64>::zeros();
-        for row in reach(row0, self.grid.rows) {
-            for col in reach(col0, self.grid.cols) {
-                let (y, x) = (row as f64 - row0, col as f64 - col0);
-                if x.hypot(y) > radius_cells {
+        let (rows, cols) = (reach(row0, self.grid.rows), reach(col0, self.grid.cols));
+        let (first_row, first_col) = (*rows.start(), *cols.start());
+        let mut cells: Vec<DiscCell> = Vec::with_capacity(SPAN * SPAN);
+        let mut moments = Moments::default();
+        for row in rows {
+            let y = row as f64 - row0;
+            let mut row_sums = [0.0; 5];
+            for col in cols.clone() {
+                let x = col as f64 - col0;
+                if x * x + y * y > radius_cells * radius_cells {
                     continue;
                 }
                 let Some((elevation_m, sigma_m)) = cell(self.grid, row, col) else { continue };
-                let basis = Vector6::new(1.0, x, y, x * x, x * y, y * y);
-                normal += basis * basis.transpose();
+                row_sums.iter_mut().zip(powers(x)).for_each(|(sum, power)| *sum += power);
                 let own_m = (sigma_m * sigma_m - self.errors.tilt_m2(row as f64, col as f64)).max(0.0).sqrt();
-                cells.push(DiscCell { row, col, basis, elevation_m, own_m });
+                cells.push(DiscCell { place: [row - first_row, col - first_col], x, y, elevation_m, own_m });
             }
+            moments.add(&row_sums, y);
         }
         if cells.len() < CELLS_MIN {
             return None;
         }
         // The value at the place itself is the constant term.
-        let picked = normal.cholesky()?.solve(&Vector6::x());
-        let elevation_m = cells.iter().map(|cell| cell.elevation_m * picked.dot(&cell.basis)).sum();
-        let noise_m2 = self.noise_m2(cells.iter().map(|cell| (cell.row, cell.col, cell.own_m * picked.dot(&cell.basis))));
+        let picked = moments.normal().cholesky()?.solve(&Vector6::x());
+        let mut elevation_m = 0.0;
+        let mut pull_m = [[0.0; SPAN]; SPAN];
+        for cell in &cells {
+            let DiscCell { x, y, .. } = *cell;
+            let pull = picked[0] + picked[1] * x + picked[2] * y + picked[3] * x * x + picked[4] * x * y + picked[5] * y * y;
+            elevation_m += cell.elevation_m * pull;
+            if let Some(place) = pull_m.get_mut(cell.place[0]).and_then(|row| row.get_mut(cell.place[1])) {
+                *place = cell.own_m * pull;
+            }
+        }
+        let noise_m2 = self.correlation.variance(&pull_m);
         noise_m2.is_finite().then_some((elevation_m, noise_m2))
     }
 }
 
-impl Smoother<'_> {
-    /// Variance of a sum of cells, each by its row, column and pull on the sum, m². The correlation of two cells is one along rows times one along
-    /// columns, so that it is taken along one after the other: a tenth of the work of all pairs.
-    fn noise_m2(&self, pulls: impl Iterator<Item = (usize, usize, f64)> + Clone) -> f64 {
-        let least = |of: fn(&(usize, usize, f64)) -> usize| pulls.clone().map(|cell| of(&cell)).min().unwrap_or(0);
-        let (first_row, first_col) = (least(|cell| cell.0), least(|cell| cell.1));
-        let mut pull_m = [[0.0; SPAN]; SPAN];
-        for (row, col, pull) in pulls {
-            if let Some(cell) = pull_m.get_mut(row - first_row).and_then(|cells| cells.get_mut(col - first_col)) {
-                *cell = pull;
-            }
-        }
-        let along: [f64; SPAN] = std::array::from_fn(|lag| self.correlation.get(lag).copied().unwrap_or(0.0));
-        let matrix: [[f64; SPAN]; SPAN] = std::array::from_fn(|a| std::array::from_fn(|b| along[a.abs_diff(b)]));
-        let spread = |values: &[f64; SPAN]| -> [f64; SPAN] {
-            let mut sum = [0.0; SPAN];
-            for (value, row) in values.iter().zip(&matrix).filter(|(value, _)| **value != 0.0) {
-                sum.iter_mut().zip(row).for_each(|(sum, share)| *sum += value * share);
-            }
-            sum
-        };
-        let across = pull_m.each_ref().map(spread);
-        let mut noise_m2 = 0.0;
-        for (pulls, row) in pull_m.iter().zip(&matrix) {
-            let mut sum = [0.0; SPAN];
-            for (values, share) in across.iter().zip(row).filter(|(_, share)| **share != 0.0) {
-                sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += share * value);
-            }
-            noise_m2 += sum.iter().zip(pulls).map(|(sum, pull)| sum * pull).sum::<f64>();
-        }
-        noise_m2
-    }
-}
-
 struct DiscCell {
-    row: usize,
-    col: usize,
-    basis: Vector6<f64>,
+    /// Row and column from the disc's first.
+    place: [usize; 2],
+    /// East and north of the disc's middle, cells.
+    x: f64,
+    y: f64,
     elevation_m: f64,
     /// One standard deviation of the matcher's part of the error, metres.
     own_m: f64,
@@ -151,13 +161,14 @@ impl CellErrors {
     pub(super) fn of(patch: &SurfacePatch) -> Self {
         let grid = &patch.grid;
         let cols = grid.cols as usize;
-        let seen = || grid.elevation_m.iter().enumerate().filter(|(_, elevation)| elevation.is_finite()).map(|(i, _)| i);
-        let count = seen().count().max(1) as f64;
-        Self {
-            row0: seen().map(|i| (i / cols) as f64).sum::<f64>() / count,
-            col0: seen().map(|i| (i % cols) as f64).sum::<f64>() / count,
-            tilt_m2_per_cell2: (patch.slope_sigma * grid.cell_m).powi(2),
+        let (mut rows, mut columns, mut count) = (0_u64, 0_u64, 0_u64);
+        for (row, cells) in grid.elevation_m.chunks(cols).enumerate() {
+            for (col, _) in cells.iter().enumerate().filter(|(_, elevation)| elevation.is_finite()) {
+                (rows, columns, count) = (rows + row as u64, columns + col as u64, count + 1);
+            }
         }
+        let mean = |sum: u64| sum as f64 / count.max(1) as f64;
+        Self { row0: mean(rows), col0: mean(columns), tilt_m2_per_cell2: (patch.slope_sigma * grid.cell_m).powi(2) }
     }
 
     /// The attitude's part at a place, m².
@@ -183,9 +194,15 @@ mod tests {
         ElevationGrid { south_west_north_m: 0.0, south_west_east_m: 0.0, cell_m, rows, cols, elevation_m, sigma_m }
     }
 
+    fn all(patch: &SurfacePatch, place: LocalPoint, elevation_m: f64) -> [Sample; SMOOTHINGS] {
+        let correlation = Correlation::new(patch.grid.cell_m, patch.error_length_m);
+        assert!(correlation.is_of(patch));
+        Smoother::new(patch, &correlation).samples(place, elevation_m, 0.004)
+    }
+
     /// The reading of the smaller disc.
     fn small(grid: &ElevationGrid, error_length_m: f64, place: LocalPoint) -> Sample {
-        Smoother::new(&patch(grid, error_length_m, 0.0)).samples(place, 0.0, 0.004)[1]
+        all(&patch(grid, error_length_m, 0.0), place, 0.0)[1]
     }
 
     #[test]
@@ -225,7 +242,7 @@ mod tests {
     fn the_attitudes_part_is_not_smoothed_away() {
         let place = LocalPoint::new(2.1, 4.0);
         // The middle is at 2.175, 2.925: 1.078 m away; 3 mrad there are 3.23 mm of the cell's 4.
-        let samples = Smoother::new(&patch(&grid(|_, _| 0.0), 1e-3, 0.003)).samples(place, 0.0, 0.004);
+        let samples = all(&patch(&grid(|_, _| 0.0), 1e-3, 0.003), place, 0.0);
         assert!((samples[0].noise_m2 - (0.004_f64.powi(2) - 0.003_233_f64.powi(2))).abs() < 1e-8);
         assert!((samples[2].sigma_m.powi(2) - samples[2].noise_m2 - 0.003_233_f64.powi(2)).abs() < 1e-8);
         assert!(samples[2].noise_m2 < samples[1].noise_m2 && samples[1].noise_m2 < samples[0].noise_m2);
@@ -235,7 +252,7 @@ mod tests {
     fn little_seen_is_not_smoothed() {
         let mut holes = grid(|_, _| 0.0);
         holes.elevation_m.iter_mut().enumerate().filter(|(i, _)| i % 3 != 0).for_each(|(_, z)| *z = f32::NAN);
-        let samples = Smoother::new(&patch(&holes, 0.1, 0.0)).samples(LocalPoint::new(2.1, 3.0), 0.01, 0.004);
+        let samples = all(&patch(&holes, 0.1, 0.0), LocalPoint::new(2.1, 3.0), 0.01);
         assert_eq!(samples[1], samples[0]);
     }
 }

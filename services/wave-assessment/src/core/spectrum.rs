@@ -3,9 +3,7 @@
 use halcyon_model::{Estimate, WaveSpectrum};
 use halcyon_ocean::confidence::variance_factors_95;
 use halcyon_ocean::interval::SpectralIntervals;
-use halcyon_ocean::{Record, SampledSpectrum, Spline, Welch};
-
-use super::series::{Series, Stretch};
+use halcyon_ocean::{Record, SampledSpectrum, Welch};
 
 /// Length of a segment, seconds, where the stretches allow: lines 0.04 Hz apart.
 const SEGMENT_S: f64 = 25.0;
@@ -25,34 +23,34 @@ pub(crate) struct Spectral {
 }
 
 impl Spectral {
-    /// Of all gauges' series, with `noise_m2` of white noise taken off; `None` where no stretch is long enough, or nothing is left above
+    /// Of all gauges' even records, with `noise_m2` of white noise taken off; `None` where no record is long enough, or nothing is left above
     /// the noise.
-    pub(crate) fn of(series: &Series, interval_s: f64, wave_hz_min: f64) -> Option<Self> {
-        let records: Vec<Record> = series.stretches.iter().filter_map(|stretch| even(stretch, interval_s)).collect();
+    pub(crate) fn of(records: &[Record], noise_m2: f64, interval_s: f64, wave_hz_min: f64) -> Option<Self> {
         let longest = records.iter().max_by_key(|record| record.samples_m().len())?;
         let segment = ((longest.duration_s() / SEGMENTS_MIN).min(SEGMENT_S) / interval_s).round() as usize;
-        let welch = Welch::new(segment);
-        let mut density = Vec::new();
-        let (mut df_hz, mut worth) = (0.0, 0.0);
-        for record in &records {
-            let Ok(spectrum) = welch.spectrum(record) else { continue };
+        let welch = Welch::new(segment).planned(segment);
+        // Gauges see the same waves: the freedom claimed is that of the longest record alone.
+        let single = welch.spectrum(longest).ok()?;
+        let mut density = vec![0.0; single.density_m2_per_hz().len()];
+        let df_hz = single.df_hz();
+        let mut worth = 0.0;
+        for record in records {
+            let Ok(spectrum) = (if std::ptr::eq(record, longest) { Ok(single.clone()) } else { welch.spectrum(record) }) else {
+                continue;
+            };
             let segments = (2.0 * record.samples_m().len() as f64 / segment as f64 - 1.0).max(1.0);
-            density.resize(spectrum.density_m2_per_hz().len(), 0.0);
             density.iter_mut().zip(spectrum.density_m2_per_hz()).for_each(|(sum, x)| *sum += segments * x);
             worth += segments;
-            df_hz = spectrum.df_hz();
         }
         if worth <= 0.0 {
             return None;
         }
         // White noise of variance σ² has 2 σ²/rate everywhere.
-        let floor = 2.0 * series.noise_m2 * interval_s;
+        let floor = 2.0 * noise_m2 * interval_s;
         density.iter_mut().for_each(|x| *x = (*x / worth - floor).max(0.0));
         let pooled = SampledSpectrum::new(df_hz, density.clone()).ok()?;
         let band = (wave_hz_min.max(0.5 * df_hz), 0.5 / interval_s);
         let found = pooled.statistics(band.0, band.1)?;
-        // Gauges see the same waves: the freedom claimed is that of the longest record alone.
-        let single = welch.spectrum(longest).ok()?;
         let alone = single.statistics(band.0, band.1)?;
         let intervals = SpectralIntervals::of(longest, &single, &alone, band)?;
         let around = |value: f64, alone: f64, (low, high): (f64, f64)| Estimate {
@@ -70,12 +68,4 @@ impl Spectral {
             spectrum: WaveSpectrum { df_hz, density_m2_per_hz: density, degrees_of_freedom: freedom, factors_95: [low, high] },
         })
     }
-}
-
-/// A stretch at even instants; `None` where it is too short for a record.
-fn even(stretch: &Stretch, interval_s: f64) -> Option<Record> {
-    let (start_s, end_s) = (*stretch.times_s.first()?, *stretch.times_s.last()?);
-    let curve = Spline::new(stretch.times_s.clone(), stretch.elevation_m.clone()).ok()?;
-    let samples = curve.sampled(start_s, interval_s, ((end_s - start_s) / interval_s).floor() as usize + 1);
-    Some(Record::new(samples, 1.0 / interval_s).ok()?.without_trend())
 }

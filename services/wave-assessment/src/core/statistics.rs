@@ -7,23 +7,21 @@
 use std::f64::consts::TAU;
 
 use halcyon_model::Estimate;
+use halcyon_ocean::Depth;
 use halcyon_ocean::confidence::variance_factors_95;
-use halcyon_ocean::crossing::{Crossing, Wave, WaveStatistics, waves};
+use halcyon_ocean::crossing::{Wave, WaveStatistics};
 use halcyon_ocean::dispersion::wavelength_m;
 use halcyon_ocean::height::{
     H_MEAN_OVER_ROOT_M0, H_RMS_OVER_ROOT_M0, H_S_OVER_ROOT_M0, H_TENTH_OVER_ROOT_M0, expected_highest_over_h_s,
 };
-use halcyon_ocean::{Depth, Record, Spline};
 
-use super::gauge::GAUGES;
 use super::hidden::{Hidden, whole_m2};
+use super::records::{dense, even, waves_at_gauges};
 use super::sampling::degrees_of_freedom;
-use super::series::Series;
+use super::series::{Series, Stretch};
 use super::spectrum::Spectral;
 use super::window::Window;
 
-/// Series are drawn this many times as dense as the patches before crests are looked for.
-const DENSER: f64 = 4.0;
 /// Heights of single waves scatter a little more than the variance does: their intervals have this share of its freedom.
 const HEIGHT_FREEDOM: f64 = 0.9;
 /// And slopes scatter less: theirs have this many times its freedom.
@@ -66,7 +64,7 @@ impl Statistics {
         if series.samples == 0 {
             return None;
         }
-        let mean_square = |pick: fn(&super::series::Stretch) -> &[f64]| {
+        let mean_square = |pick: fn(&Stretch) -> &[f64]| {
             series.stretches.iter().flat_map(pick).map(|x| x * x).sum::<f64>() / series.samples as f64
         };
         let variance_m2 = mean_square(|s| &s.elevation_m);
@@ -77,13 +75,16 @@ impl Statistics {
         // Noise about zero makes waves that are none; a dead band against it swallows small waves that are some. Estimates are the
         // mean of both counts, bounds reach to the further one.
         let records = dense(series, interval_s);
-        let (all, at_each) = waves_at_gauges(&records, noise_m2.sqrt());
-        let counts = [WaveStatistics::of(&waves_at_gauges(&records, 0.0).0), WaveStatistics::of(&all)];
+        let [(every, _), (all, at_each)] = waves_at_gauges(&records, [0.0, noise_m2.sqrt()]);
+        // A dead band that swallows none leaves them all as they are.
+        let of_all = WaveStatistics::of(&all);
+        let counts = [if every.len() == all.len() { of_all } else { WaveStatistics::of(&every) }, of_all];
         let counts: Vec<WaveStatistics> = counts.into_iter().flatten().collect();
         let period_s = counts.last().map(|c| c.t_z_s);
         // Where nothing varies there are no degrees of freedom, and nothing that they would scale.
         let freedom = degrees_of_freedom(series, interval_s, period_s).unwrap_or(1.0).max(1.0);
-        let above_noise = variance_m2 * variance_factors_95(freedom).0 > 2.0 * noise_m2;
+        let factors = variance_factors_95(freedom);
+        let above_noise = variance_m2 * factors.0 > 2.0 * noise_m2;
 
         let hidden_m = if let Hidden::Measured { h_m0_m, .. } = hidden { *h_m0_m } else { 0.0 };
         // All cells tell the variance a little better than nine of them, and much better where cells or frames are missing.
@@ -91,10 +92,11 @@ impl Statistics {
         let share = whole_m2(window, hidden).filter(|_| above_noise).map_or(1.0, |whole_m2| whole_m2 / waves_m2);
         let whole = if (1.0 / WHOLE_MAX..=WHOLE_MAX).contains(&share) { share } else { share.clamp(1.0, WHOLE_MAX) };
         let scale = Scale { variance_m2, upper_m2, noise_m2, hidden_m, whole };
+        let height_factors = variance_factors_95(freedom * HEIGHT_FREEDOM);
         let height = |pick: fn(&WaveStatistics) -> f64, ratio: f64| {
             let heights_m: Vec<f64> = counts.iter().map(pick).collect();
             let heights_m = if heights_m.is_empty() { vec![ratio * variance_m2.sqrt()] } else { heights_m };
-            let of = |height_m: f64| scale.height(height_m, freedom * HEIGHT_FREEDOM);
+            let of = |height_m: f64| scale.height(height_m, height_factors);
             Estimate { value: of(mean(&heights_m)).value, low: of(min(&heights_m)).low, high: of(max(&heights_m)).high }
         };
         let periods_s: Vec<f64> = counts.iter().map(|c| c.t_z_s).collect();
@@ -114,11 +116,11 @@ impl Statistics {
             h_mean_m: height(|f| f.h_mean_m, H_MEAN_OVER_ROOT_M0),
             h_s_m: height(|f| f.h_s_m, H_S_OVER_ROOT_M0),
             h_max_m: scale.observed(counts.iter().map(|c| c.h_max_m).fold(0.0, f64::max), all.len()),
-            h_m0_m: scale.height(4.0 * variance_m2.sqrt(), freedom),
+            h_m0_m: scale.height(4.0 * variance_m2.sqrt(), factors),
             h_rms_m: height(|f| f.h_rms_m, H_RMS_OVER_ROOT_M0),
             h_tenth_m: height(|f| f.h_tenth_m, H_TENTH_OVER_ROOT_M0),
             t_z_s,
-            spectral: if above_noise { Spectral::of(series, interval_s, wave_hz_min) } else { None },
+            spectral: if above_noise { Spectral::of(&even(&records), noise_m2, interval_s, wave_hz_min) } else { None },
             slope_rms_rad: slope(window, freedom),
             freedom,
         })
@@ -130,9 +132,15 @@ impl Statistics {
         self.t_z_s.unwrap_or(Estimate { value: PERIOD_S_MIN, low: PERIOD_S_MIN, high: PERIOD_S_MIN })
     }
 
-    /// Expected highest wave during `landing_s`, over a Rayleigh sea of H_s and T_z.
-    pub(crate) fn highest_m(&self, landing_s: f64) -> Estimate {
-        self.per_period(self.significant_m(), |h_s_m, t_z_s| h_s_m * expected_highest_over_h_s(landing_s / t_z_s))
+    /// Expected highest of the waves of `landing_s`, over H_s.
+    pub(crate) fn largest(&self, landing_s: f64) -> Largest {
+        let Estimate { value, low, high } = self.period_s();
+        Largest([value, high, low].map(|t_z_s| expected_highest_over_h_s(landing_s / t_z_s)))
+    }
+
+    /// Expected highest wave during a landing, over a Rayleigh sea of H_s and T_z.
+    pub(crate) fn highest_m(&self, largest: &Largest) -> Estimate {
+        largest.of(self.significant_m(), |h_s_m, over_h_s| h_s_m * over_h_s)
     }
 
     /// Root mean square vertical speed of the surface, metres per second: 2π √m0/T_z.
@@ -140,16 +148,15 @@ impl Statistics {
         self.per_period(self.h_m0_m, |h_m0_m, t_z_s| 0.25 * h_m0_m * TAU / t_z_s)
     }
 
-    /// Expected fastest rise of the surface during `landing_s`, metres per second.
-    pub(crate) fn rise_mps(&self, landing_s: f64) -> Estimate {
-        self.per_period(self.vertical_speed_rms_mps(), |rms_mps, t_z_s| rms_mps * amplitude_over_rms(landing_s / t_z_s))
+    /// Expected fastest rise of the surface during a landing, metres per second.
+    pub(crate) fn rise_mps(&self, largest: &Largest) -> Estimate {
+        largest.of(self.vertical_speed_rms_mps(), |rms_mps, over_h_s| rms_mps * amplitude_over_rms(over_h_s))
     }
 
-    /// Expected steepest tilt of the water during `landing_s`, radians; `None` where the slope is not known. As if all slopes lay in one
+    /// Expected steepest tilt of the water during a landing, radians; `None` where the slope is not known. As if all slopes lay in one
     /// direction, which makes the most of them.
-    pub(crate) fn tilt_rad(&self, landing_s: f64) -> Option<Estimate> {
-        let steepest = |rms: f64, t_z_s: f64| (rms * amplitude_over_rms(landing_s / t_z_s)).atan();
-        self.slope_rms_rad.map(|rms| self.per_period(rms, steepest))
+    pub(crate) fn tilt_rad(&self, largest: &Largest) -> Option<Estimate> {
+        self.slope_rms_rad.map(|rms| largest.of(rms, |rms, over_h_s| (rms * amplitude_over_rms(over_h_s)).atan()))
     }
 
     /// Length of waves of the mean period, metres, in deep water: in shallow water they are shorter.
@@ -171,9 +178,20 @@ impl Statistics {
     }
 }
 
-/// Expected highest of so many amplitudes of a narrow Gaussian process, over its root mean square: half of a highest wave's.
-fn amplitude_over_rms(waves: f64) -> f64 {
-    0.5 * H_S_OVER_ROOT_M0 * expected_highest_over_h_s(waves)
+/// Expected highest of the waves of a landing over H_s: with the mean period, and with the upper and the lower end of its interval.
+pub(crate) struct Largest([f64; 3]);
+
+impl Largest {
+    /// Of something that rises with it, `f`: its bounds with the further end of the period's interval.
+    fn of(&self, of: Estimate, f: impl Fn(f64, f64) -> f64) -> Estimate {
+        let Self([value, fewest, most]) = *self;
+        Estimate { value: f(of.value, value), low: f(of.low, fewest), high: f(of.high, most) }
+    }
+}
+
+/// Expected highest amplitude of a narrow Gaussian process over its root mean square: half of a highest wave's.
+fn amplitude_over_rms(highest_over_h_s: f64) -> f64 {
+    0.5 * H_S_OVER_ROOT_M0 * highest_over_h_s
 }
 
 /// Variances behind the heights, m²: as estimated, with all that may be waves, and the readings' own noise; and the height, metres,
@@ -188,13 +206,12 @@ struct Scale {
 }
 
 impl Scale {
-    /// Interval of a height that scales with the root of a variance of `freedom` degrees.
-    fn height(&self, height_m: f64, freedom: f64) -> Estimate {
+    /// Interval of a height that scales with the root of a variance, whose own interval reaches from `low` to `high` times its estimate.
+    fn height(&self, height_m: f64, (low, high): (f64, f64)) -> Estimate {
         if self.variance_m2 <= 0.0 {
             let high = 4.0 * self.upper_m2.sqrt();
             return Estimate { value: 0.0, low: 0.0, high };
         }
-        let (low, high) = variance_factors_95(freedom);
         let share = |variance_m2: f64| height_m * (self.whole * variance_m2.max(0.0) / self.variance_m2).sqrt();
         Estimate {
             value: share(self.variance_m2 - self.noise_m2),
@@ -218,31 +235,6 @@ impl Scale {
             high: height_m * ratio(self.upper_m2).max(1.0) + NORMAL_95 * sigma_m + split_m,
         }
     }
-}
-
-/// Every stretch drawn densely, and its gauge.
-fn dense(series: &Series, interval_s: f64) -> Vec<(usize, Record)> {
-    let step_s = interval_s / DENSER;
-    let drawn = |stretch: &super::series::Stretch| {
-        let (start_s, end_s) = (*stretch.times_s.first()?, *stretch.times_s.last()?);
-        // Stamps rise and readings are finite, so neither can fail; a stretch that did would only be one stretch less.
-        let curve = Spline::new(stretch.times_s.clone(), stretch.elevation_m.clone()).ok()?;
-        let dense_m = curve.sampled(start_s, step_s, ((end_s - start_s) / step_s).floor() as usize + 1);
-        Some((stretch.slot, Record::new(dense_m, 1.0 / step_s).ok()?))
-    };
-    series.stretches.iter().filter_map(drawn).collect()
-}
-
-/// Waves of every record, and how many each gauge had.
-fn waves_at_gauges(records: &[(usize, Record)], deadband_m: f64) -> (Vec<Wave>, [usize; GAUGES]) {
-    let mut all = Vec::new();
-    let mut at_each = [0; GAUGES];
-    for (slot, record) in records {
-        let found = waves(record, Crossing::Up, deadband_m);
-        at_each[*slot] += found.len();
-        all.extend(found);
-    }
-    (all, at_each)
 }
 
 /// 95 % error of the mean period: the scatter of single periods over the root of the number of independent waves.

@@ -8,7 +8,7 @@ use halcyon_model::{ElevationGrid, LocalPoint, Stamp, SurfacePatch};
 use super::film::Raster;
 use super::gauge::{GAUGES, Gauges, Reading};
 use super::hidden::Bend;
-use super::patch::cell;
+use super::smooth::Smoothed;
 
 /// Never more frames than this, whatever the rate: the oldest go first.
 const FRAMES_MAX: usize = 4096;
@@ -31,6 +31,8 @@ pub(crate) struct Frame {
     /// The patch's shorter side, or that of a square as large as what was seen of it if that is less, metres.
     pub footprint_m: f64,
     pub readings: [Option<Reading>; GAUGES],
+    /// What smoothing takes out of them.
+    pub smoothing: Smoothed,
     pub slope: Option<Slope>,
     /// One standard deviation of roll and pitch, radians.
     pub attitude_sigma_rad: f64,
@@ -66,6 +68,7 @@ impl Window {
         let (height_m, width_m) = (f64::from(grid.rows - 1) * grid.cell_m, f64::from(grid.cols - 1) * grid.cell_m);
         let centre = LocalPoint::new(grid.south_west_north_m + 0.5 * height_m, grid.south_west_east_m + 0.5 * width_m);
         let (seen, fingerprint) = survey(grid);
+        let readings = self.gauges.read(patch);
         let frame = Frame {
             stamp: patch.stamp,
             centre,
@@ -73,7 +76,8 @@ impl Window {
             // patch cannot cover anything without a cell that was seen.
             coverage: if seen > 0.0 { patch.coverage } else { 0.0 },
             footprint_m: height_m.min(width_m).min((seen * height_m * width_m).sqrt()).max(grid.cell_m),
-            readings: self.gauges.read(patch),
+            smoothing: Smoothed::of(readings.iter().flatten().map(|reading| &reading.samples)),
+            readings,
             bend: Bend::of(patch),
             attitude_sigma_rad: patch.attitude_sigma_rad,
             slope: slope(grid, slope_baseline_m),
@@ -91,8 +95,14 @@ impl Window {
         let place = self.frames.partition_point(|old| old.stamp < frame.stamp);
         self.frames.insert(place, frame);
         if let Some((newest, centre)) = self.newest().map(|frame| (frame.stamp, frame.centre)) {
-            self.frames
-                .retain(|old| newest.seconds_since(old.stamp) <= window_s && old.centre.distance_m(&centre) <= spot_radius_m);
+            // Frames are in order, and large: those that stay are not moved for those that go.
+            while self.frames.front().is_some_and(|old| newest.seconds_since(old.stamp) > window_s) {
+                self.frames.pop_front();
+            }
+            let is_near = |old: &Frame| old.centre.distance_m(&centre) <= spot_radius_m;
+            if !self.frames.iter().all(is_near) {
+                self.frames.retain(is_near);
+            }
         }
         if self.frames.len() > FRAMES_MAX {
             self.frames.pop_front();
@@ -155,6 +165,11 @@ fn slope(grid: &ElevationGrid, baseline_m: f64) -> Option<Slope> {
     Some(Slope { mean_square: between(|s| s.mean_square), noise: between(|s| s.noise) })
 }
 
+/// So many cells from each of two on; `None` where there are not so many.
+fn beside(cells: &[f32], [from, to]: [usize; 2], width: usize) -> Option<(&[f32], &[f32])> {
+    Some((cells.get(from..from + width)?, cells.get(to..to + width)?))
+}
+
 /// The same between cells `step` apart.
 fn slope_over(grid: &ElevationGrid, step: usize) -> Option<Slope> {
     let (rows, cols) = (grid.rows as usize, grid.cols as usize);
@@ -162,13 +177,23 @@ fn slope_over(grid: &ElevationGrid, step: usize) -> Option<Slope> {
     let (mut mean_square, mut noise) = (0.0, 0.0);
     for (row_step, col_step) in [(step, 0), (0, step)] {
         let (mut squares, mut variances, mut pairs) = (0.0, 0.0, 0_u32);
+        let width = cols - col_step;
         for row in 0..rows - row_step {
-            for col in 0..cols - col_step {
-                if let (Some((a_m, a_sigma_m)), Some((b_m, b_sigma_m))) =
-                    (cell(grid, row, col), cell(grid, row + row_step, col + col_step))
-                {
-                    squares += (b_m - a_m).powi(2);
-                    variances += a_sigma_m.powi(2) + b_sigma_m.powi(2);
+            let (from, to) = (row * cols, (row + row_step) * cols + col_step);
+            // A row, and what lies a step from it.
+            let (Some((a_m, b_m)), Some((a_sigma_m, b_sigma_m))) =
+                (beside(&grid.elevation_m, [from, to], width), beside(&grid.sigma_m, [from, to], width))
+            else {
+                continue;
+            };
+            let (elevations_m, sigmas_m) = (a_m.iter().zip(b_m), a_sigma_m.iter().zip(b_sigma_m));
+            for ((a_m, b_m), (a_sigma_m, b_sigma_m)) in elevations_m.zip(sigmas_m) {
+                let (rise_m, variance_m2) =
+                    (f64::from(*b_m) - f64::from(*a_m), f64::from(*a_sigma_m).powi(2) + f64::from(*b_sigma_m).powi(2));
+                // Not so where either was not seen.
+                if rise_m.is_finite() && variance_m2.is_finite() {
+                    squares += rise_m.powi(2);
+                    variances += variance_m2;
                     pairs += 1;
                 }
             }
@@ -199,6 +224,29 @@ mod tests {
         // Two cells of 3 mm each over 0.4 m, in two directions.
         assert!((slope.noise - 2.0 * 2.0 * (0.003f64 / 0.4).powi(2)).abs() < 1e-8);
         assert_eq!(super::slope(&grid(|_, _| f32::NAN), 0.4), None);
+    }
+
+    /// Pair by pair, with holes in elevations and in deviations.
+    #[test]
+    fn only_pairs_that_were_seen_count() {
+        let mut holes = grid(|n, e| (0.02 * (7.0 * n - 3.0 * e).sin()) as f32);
+        holes.elevation_m.iter_mut().step_by(7).for_each(|z| *z = f32::NAN);
+        holes.sigma_m.iter_mut().step_by(11).for_each(|sigma_m| *sigma_m = f32::INFINITY);
+        holes.sigma_m.iter_mut().skip(3).step_by(5).for_each(|sigma_m| *sigma_m *= 2.0);
+        for step in [1, 4, 39] {
+            let (mut mean_square, mut noise) = (0.0, 0.0);
+            for (down, across) in [(step, 0), (0, step)] {
+                let places = (0..40 - down).flat_map(|row| (0..50 - across).map(move |col| (row, col)));
+                let seen = |row, col| crate::core::patch::cell(&holes, row, col);
+                let pairs: Vec<((f64, f64), (f64, f64))> =
+                    places.filter_map(|(row, col)| seen(row, col).zip(seen(row + down, col + across))).collect();
+                let over = pairs.len() as f64 * (step as f64 * 0.1).powi(2);
+                mean_square += pairs.iter().map(|(a, b)| (b.0 - a.0).powi(2)).sum::<f64>() / over;
+                noise += pairs.iter().map(|(a, b)| a.1.powi(2) + b.1.powi(2)).sum::<f64>() / over;
+            }
+            let found = slope_over(&holes, step).unwrap();
+            assert!((found.mean_square / mean_square - 1.0).abs() < 1e-12 && (found.noise / noise - 1.0).abs() < 1e-12);
+        }
     }
 
     #[test]

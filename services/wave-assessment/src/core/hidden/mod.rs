@@ -7,26 +7,26 @@
 //! [`splitter`]); it never makes water look calmer than it could be.
 
 mod bend;
+mod response;
+mod run;
 mod splitter;
 
 use std::f64::consts::TAU;
 
 pub(crate) use bend::Bend;
-use bend::bend_of_residual_per_m4;
 use halcyon_model::LocalPoint;
+use halcyon_ocean::Depth;
 use halcyon_ocean::dispersion::{angular_frequency_radps, wavenumber_radpm};
-use halcyon_ocean::filter::Mirrored;
-use halcyon_ocean::{Depth, Record, Spline};
+use response::bend_of_residual_per_m4;
+use run::Run;
 use splitter::{Shape, Splitter};
 
-use super::series::{despike, median, runs};
+use super::series::{median, runs};
 use super::window::{Frame, Window};
 use crate::config::Config;
 
 /// Least share of frames with a level, or a bend, for it to be used; the others are then left out.
 const KNOWN_MIN: f64 = 0.9;
-/// Fewer samples in a row than this cannot be filtered.
-const SAMPLES_MIN: usize = 16;
 /// A frame whose mean square stands out from both neighbours by so many medians is a spike: a patch that sees one point of a wave reaches 25 at 3.4
 /// deviations.
 const SPIKE_SQUARE: f64 = 25.0;
@@ -140,14 +140,11 @@ pub(crate) fn hidden(window: &Window, config: &Config, interval_s: f64) -> Hidde
         .map(|(i, f)| (i, f.stamp.seconds_since(frames[0].stamp)))
         .collect();
     for run in runs(&stamps_s, config.gap_s_max.max(2.0 * interval_s)) {
-        let run = Run::new(run, interval_s);
-        if run.samples < SAMPLES_MIN {
-            continue;
-        }
+        let Some(run) = Run::new(run, interval_s) else { continue };
         let Some(levels) = run.even(run.frames.iter().filter_map(|i| level(&frames[*i])).collect()) else { continue };
-        let bends: Vec<Bend> = run.frames.iter().filter_map(|i| frames[*i].bend).collect();
+        let bends: Vec<&Bend> = run.frames.iter().filter_map(|i| frames[*i].bend.as_ref()).collect();
         let shape = if with_bends {
-            let series = |of: &dyn Fn(&Bend) -> f64| run.even(bends.iter().map(of).collect());
+            let series = |of: &dyn Fn(&Bend) -> f64| run.even(bends.iter().map(|bend| of(bend)).collect());
             let (bend, east, north) = (series(&|b| b.half_laplacian_per_m), series(&|b| b.slope[0]), series(&|b| b.slope[1]));
             bend.zip(east.zip(north)).map(|(bend, (east, north))| Shape { bend, slopes: [east, north] })
         } else {
@@ -182,10 +179,8 @@ pub(crate) fn hidden(window: &Window, config: &Config, interval_s: f64) -> Hidde
 fn splitter(window: &Window, config: &Config, interval_s: f64, with_levels: bool) -> Splitter {
     let frames = window.frames();
     let mean = |of: &dyn Fn(&Frame) -> f64| frames.iter().map(of).sum::<f64>() / frames.len().max(1) as f64;
-    let bend_mean = |of: &dyn Fn(&Bend) -> f64| {
-        let bends: Vec<f64> = frames.iter().filter_map(|f| f.bend.as_ref().map(of)).collect();
-        bends.iter().sum::<f64>() / bends.len().max(1) as f64
-    };
+    let bends: Vec<&Bend> = frames.iter().filter_map(|f| f.bend.as_ref()).collect();
+    let bend_mean = |of: &dyn Fn(&Bend) -> f64| bends.iter().map(|bend| of(bend)).sum::<f64>() / bends.len().max(1) as f64;
     let level_noise_m2 = match (with_levels, config.fixed_rig) {
         // A deviation that nobody states explains everything.
         (true, false) => mean(&|f| f.level_sigma_m.map_or(f64::INFINITY, |s| s * s)),
@@ -206,35 +201,5 @@ fn splitter(window: &Window, config: &Config, interval_s: f64, with_levels: bool
         bend_noise_per_m2: bend_mean(&|b| b.sigma_per_m.powi(2)) + ripple_noise_per_m2,
         slope_noise: 2.0 * mean(&|f| f.attitude_sigma_rad.powi(2)),
         sides_m,
-    }
-}
-
-/// An unbroken row of frames, and the even instants over it.
-struct Run {
-    frames: Vec<usize>,
-    times_s: Vec<f64>,
-    interval_s: f64,
-    samples: usize,
-}
-
-impl Run {
-    fn new(points: &[(usize, f64)], interval_s: f64) -> Self {
-        let times_s: Vec<f64> = points.iter().map(|(_, t)| *t).collect();
-        let samples = ((times_s[times_s.len() - 1] - times_s[0]) / interval_s).floor() as usize + 1;
-        Self { frames: points.iter().map(|(i, _)| *i).collect(), times_s, interval_s, samples }
-    }
-
-    /// One value for each frame, without spikes, at even instants, by frequency; `None` if that is no record.
-    fn even(&self, mut values: Vec<f64>) -> Option<Mirrored> {
-        despike(&mut values, &mut []);
-        let even = Spline::new(self.times_s.clone(), values).ok()?.sampled(self.times_s[0], self.interval_s, self.samples);
-        Some(Mirrored::of(&Record::new(even, 1.0 / self.interval_s).ok()?))
-    }
-
-    /// From even instants back to the frames' own.
-    fn back(&self, even: Vec<f64>) -> Option<Vec<f64>> {
-        let knots: Vec<f64> = (0..self.samples).map(|i| self.times_s[0] + i as f64 * self.interval_s).collect();
-        let curve = Spline::new(knots, even).ok()?;
-        Some(self.times_s.iter().map(|t| curve.sampled(*t, 1.0, 1).first().copied().unwrap_or(0.0)).collect())
     }
 }

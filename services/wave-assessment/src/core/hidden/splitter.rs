@@ -14,7 +14,7 @@ use halcyon_ocean::Depth;
 use halcyon_ocean::dispersion::wavenumber_radpm;
 use halcyon_ocean::filter::{Complex, Mirrored, band};
 
-use super::bend::Response;
+use super::response::Response;
 
 /// Components to either side that a component's power is averaged with …
 const SMOOTHED: usize = 4;

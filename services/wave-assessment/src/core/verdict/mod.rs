@@ -5,7 +5,7 @@ mod checks;
 use checks::{Checks, Outcome};
 use halcyon_model::{Estimate, QualityFlag, VerdictReason, VerdictState};
 
-use super::statistics::Statistics;
+use super::statistics::{Largest, Statistics};
 use crate::config::{Airframe, Config};
 
 /// Crests need at least this many samples a wave.
@@ -54,8 +54,9 @@ pub(crate) fn judge(evidence: &Evidence, config: &Config, previous: VerdictState
     match (&evidence.statistics, config.airframe.resolved()) {
         (Some(statistics), Ok(airframe)) => {
             waves(&mut checks, statistics, evidence.interval_s, config, previous);
-            heights(&mut checks, statistics, config);
-            vehicle(&mut checks, statistics, config, &airframe);
+            let largest = statistics.largest(config.landing_s);
+            heights(&mut checks, statistics, &largest, config);
+            vehicle(&mut checks, statistics, &largest, config, &airframe);
         }
         (_, Err(problem)) => checks.unknown("airframe", &problem),
         (None, Ok(_)) => {
@@ -146,10 +147,10 @@ fn waves(checks: &mut Checks, statistics: &Statistics, interval_s: Option<f64>, 
 }
 
 /// Limits of the mission.
-fn heights(checks: &mut Checks, statistics: &Statistics, config: &Config) {
+fn heights(checks: &mut Checks, statistics: &Statistics, largest: &Largest, config: &Config) {
     checks.limit("significant_height", "H_s", "m", statistics.significant_m(), config.h_s_m_max);
     checks.limit("highest_tenth", "mean of the highest tenth", "m", statistics.h_tenth_m, config.h_tenth_m_max);
-    let highest_m = statistics.highest_m(config.landing_s);
+    let highest_m = statistics.highest_m(largest);
     checks.limit("highest_wave", "expected highest wave of the landing", "m", highest_m, config.h_highest_m_max);
     match statistics.slope_rms_rad {
         Some(slope) => checks.limit("slope", "RMS slope", "rad", slope, config.slope_rms_rad_max),
@@ -158,10 +159,9 @@ fn heights(checks: &mut Checks, statistics: &Statistics, config: &Config) {
 }
 
 /// Limits of the airframe, each less its margin.
-fn vehicle(checks: &mut Checks, statistics: &Statistics, config: &Config, airframe: &Airframe) {
-    let landing_s = config.landing_s;
+fn vehicle(checks: &mut Checks, statistics: &Statistics, largest: &Largest, config: &Config, airframe: &Airframe) {
     let kept = 1.0 - config.airframe.margin;
-    match statistics.tilt_rad(landing_s) {
+    match statistics.tilt_rad(largest) {
         Some(tilt) => {
             checks.limit("tilt", "expected steepest water of the landing", "rad", tilt, airframe.tip_angle_rad * kept);
         }
@@ -182,7 +182,7 @@ fn vehicle(checks: &mut Checks, statistics: &Statistics, config: &Config, airfra
         checks.limit("hull", &what, "m", crest, deck_m);
     }
     let descent_mps = config.airframe.descent_mps;
-    let rise = statistics.rise_mps(landing_s);
+    let rise = statistics.rise_mps(largest);
     let meeting = Estimate { value: rise.value + descent_mps, low: rise.low + descent_mps, high: rise.high + descent_mps };
     checks.limit(
         "touchdown_speed",
