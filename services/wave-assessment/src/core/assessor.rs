@@ -1,13 +1,14 @@
 //! From patch to sea state.
 
 use halcyon_model::{
-    IdError, LocalPoint, QualityFlag, RigId, SeaState, Stamp, SurfacePatch, VehicleState, Verdict, VerdictReason, VerdictState,
+    IdError, LocalPoint, RigId, SeaState, Stamp, SurfacePatch, VehicleState, Verdict, VerdictReason, VerdictState,
 };
 
 use super::around::{Around, Glance};
 use super::hidden::{Hidden, hidden};
 use super::patch::{self, PatchError};
 use super::quality;
+use super::ripples::Ripples;
 use super::series::Series;
 use super::statistics::Statistics;
 use super::verdict::{Evidence, Judgement, judge};
@@ -30,15 +31,11 @@ pub struct Assessor {
     /// What the last sea state rests on, and whether it could be trusted.
     statistics: Option<Statistics>,
     is_trusted: bool,
-    /// Rotor ripples, and patch time of when they were looked for.
-    ripples: Option<(Stamp, Option<QualityFlag>)>,
+    ripples: Ripples,
     around: Option<Around>,
     /// Counts how often the window was filled anew.
     filling: u64,
 }
-
-/// Rotor ripples are looked for once in so many seconds of patch time.
-const RIPPLES_PERIOD_S: f64 = 5.0;
 
 impl Assessor {
     /// An assessor that has seen nothing.
@@ -58,7 +55,7 @@ impl Assessor {
             verdict,
             statistics: None,
             is_trusted: false,
-            ripples: None,
+            ripples: Ripples::default(),
             around: None,
             filling: 0,
         })
@@ -89,7 +86,7 @@ impl Assessor {
                 }
             }
         }
-        self.window.add(patch, self.config.window_s, self.config.spot_radius_m, self.config.slope_baseline_m);
+        self.window.add(patch, self.ripples.radius_m(), &self.config);
         // Half an interval early is on time: stamps are not exact multiples of the period.
         let early_s = 0.5 * self.window.interval_s().unwrap_or(0.0);
         if self.assessed.is_some_and(|last| patch.stamp.seconds_since(last) < self.config.period_s - early_s) {
@@ -182,18 +179,9 @@ impl Assessor {
         self.issued = None;
         self.verdict = VerdictState::Inconclusive;
         self.statistics = None;
-        self.ripples = None;
+        self.ripples = Ripples::default();
         self.around = None;
         self.filling += 1;
-    }
-
-    /// Rotor ripples, looked for anew if it is time.
-    fn ripples(&mut self, newest: Stamp) -> Option<QualityFlag> {
-        let is_fresh = |at: &Stamp| (0.0..RIPPLES_PERIOD_S).contains(&newest.seconds_since(*at));
-        if !self.ripples.as_ref().is_some_and(|(at, _)| is_fresh(at)) {
-            self.ripples = Some((newest, quality::downwash(&self.window)));
-        }
-        self.ripples.as_ref().and_then(|(_, found)| found.clone())
     }
 
     fn assess(&mut self, now: Stamp) -> Option<SeaState> {
@@ -209,7 +197,8 @@ impl Assessor {
             (hidden, series, statistics)
         });
         let (hidden, series, statistics) = measured.map_or((None, None, None), |(h, s, t)| (Some(h), Some(s), t));
-        let rings = self.ripples(newest);
+        self.ripples.look(self.window.grids(), newest, self.config.window_s);
+        let rings = self.ripples.flag();
         let frames = self.window.frames();
         let mean = |f: &dyn Fn(&super::window::Frame) -> f64| frames.iter().map(f).sum::<f64>() / frames.len() as f64;
         let evidence = Evidence {
