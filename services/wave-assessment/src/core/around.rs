@@ -6,7 +6,7 @@
 use halcyon_model::{CalmForecast, Directional, LocalPoint, Stamp};
 
 use super::ahead::calm;
-use super::direction::directional;
+use super::direction::{Directions, directional};
 use super::film::film;
 use super::hidden::hidden;
 use super::series::Series;
@@ -33,7 +33,7 @@ pub struct Around {
     at: Stamp,
     /// Patch time of the directions.
     directions_at: Stamp,
-    directional: Option<Directional>,
+    directions: Option<Directions>,
     calm: Option<CalmForecast>,
     testimony: Option<Testimony>,
     /// Which filling of the window it is of.
@@ -44,7 +44,7 @@ impl Around {
     /// Directions, unless they are of long ago.
     pub(super) fn directional(&self, newest: Stamp) -> Option<Directional> {
         let is_fresh = newest.seconds_since(self.directions_at) <= DIRECTIONS_AGE_S_MAX;
-        self.directional.filter(|_| is_fresh)
+        self.directions.as_ref().filter(|_| is_fresh).map(|directions| directions.overall)
     }
 
     /// Quiet moments, unless they were found long ago.
@@ -114,20 +114,20 @@ impl Glance {
     #[must_use]
     pub fn look(self) -> Around {
         let is_fresh = |last: &&Around| (0.0..DIRECTIONS_PERIOD_S).contains(&self.at.seconds_since(last.directions_at));
-        let (directional, testimony, directions_at) = match self.last.as_ref().filter(is_fresh) {
-            Some(last) => (last.directional, last.testimony.clone(), last.directions_at),
+        let (directions, testimony, directions_at) = match self.last.as_ref().filter(is_fresh) {
+            Some(last) => (last.directions.clone(), last.testimony.clone(), last.directions_at),
             None => (self.directions(), self.testimony(), self.at),
         };
         let spectral = self.statistics.as_ref().and_then(|statistics| statistics.spectral.as_ref());
         let calm = spectral
-            .zip(directional.as_ref())
+            .zip(directions.as_ref())
             .filter(|_| self.is_trusted)
-            .and_then(|(spectral, directional)| calm(&self.window, spectral, directional, self.place, &self.config));
-        Around { at: self.at, directions_at, directional, calm, testimony, filling: self.filling }
+            .and_then(|(spectral, directions)| calm(&self.window, spectral, directions, self.place, &self.config));
+        Around { at: self.at, directions_at, directions, calm, testimony, filling: self.filling }
     }
 
     /// Without waves above the noise there are none.
-    fn directions(&self) -> Option<Directional> {
+    fn directions(&self) -> Option<Directions> {
         let (statistics, interval_s) = (self.statistics.as_ref()?, self.window.interval_s()?);
         directional(&film(&self.window, interval_s)?, statistics.t_z_s?.value, statistics.freedom)
     }
