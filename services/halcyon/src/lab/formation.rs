@@ -56,6 +56,8 @@ pub(super) fn run(lab: &Lab) -> Result<Exhibit, LabError> {
             }
             if gnss != Gnss::Perfect {
                 rows.push(row(&format!("Halcyon, receivers: {name}"), &flown));
+                let shares = |seed| Scenario { slot_m, seed, gnss, shares_intent: true, ..Scenario::new(Law::Halcyon, flight) };
+                rows.push(row(&format!("Halcyon, the leader says what it asks for, receivers: {name}"), &mean(seeds, shares)?));
             }
         }
         rows.push(vec!["the thesis".into(), number(thesis_range_m), number(thesis_altitude_m), "-".into(), "-".into()]);

@@ -3,13 +3,13 @@
 //! It takes tens of milliseconds, far more than a patch may take, and no verdict is safe for it. So it is looked for apart: a [`Glance`] is a copy
 //! of all it needs and can be taken anywhere, on any thread; what it finds goes into the sea states that follow.
 
-use halcyon_model::{CalmForecast, Directional, LocalPoint, QualityFlag, Stamp};
+use halcyon_model::{CalmForecast, Directional, LocalPoint, Stamp};
 
 use super::ahead::calm;
-use super::direction::directional;
+use super::direction::{Directions, directional};
 use super::film::film;
 use super::hidden::hidden;
-use super::quality;
+use super::ripples::Ripples;
 use super::series::Series;
 use super::statistics::Statistics;
 use super::window::Window;
@@ -24,8 +24,6 @@ const CALM_PERIOD_S: f64 = 1.0;
 const CALM_AGE_S_MAX: f64 = 3.0;
 /// And directions.
 const DIRECTIONS_AGE_S_MAX: f64 = 30.0;
-/// And rotors' ripples.
-const RINGS_AGE_S_MAX: f64 = 15.0;
 /// And what the witness said.
 const TESTIMONY_AGE_S_MAX: f64 = 15.0;
 
@@ -36,11 +34,11 @@ pub struct Around {
     at: Stamp,
     /// Patch time of the directions.
     directions_at: Stamp,
-    directional: Option<Directional>,
+    directions: Option<Directions>,
     calm: Option<CalmForecast>,
     testimony: Option<Testimony>,
-    /// Rotors' ripples, of the same time as the directions.
-    rings: Option<QualityFlag>,
+    /// Rotors' ripples, with those of before.
+    ripples: Ripples,
     /// Which filling of the window it is of.
     filling: u64,
 }
@@ -49,7 +47,7 @@ impl Around {
     /// Directions, unless they are of long ago.
     pub(super) fn directional(&self, newest: Stamp) -> Option<Directional> {
         let is_fresh = newest.seconds_since(self.directions_at) <= DIRECTIONS_AGE_S_MAX;
-        self.directional.filter(|_| is_fresh)
+        self.directions.as_ref().filter(|_| is_fresh).map(|directions| directions.overall)
     }
 
     /// Quiet moments, unless they were found long ago.
@@ -58,9 +56,9 @@ impl Around {
         self.calm.clone().filter(|_| is_fresh)
     }
 
-    /// Rotors' ripples, unless they were seen long ago.
-    pub(super) fn rings(&self, newest: Stamp) -> Option<&QualityFlag> {
-        self.rings.as_ref().filter(|_| newest.seconds_since(self.directions_at) <= RINGS_AGE_S_MAX)
+    /// Rotors' ripples.
+    pub(super) fn ripples(&self) -> &Ripples {
+        &self.ripples
     }
 
     /// What the witness says, unless it is of long ago.
@@ -84,6 +82,7 @@ pub struct Glance {
     place: LocalPoint,
     /// Whether there is anything to forecast: what cannot be trusted is not.
     is_trusted: bool,
+    ripples: Ripples,
     last: Option<Around>,
     at: Stamp,
     filling: u64,
@@ -97,6 +96,7 @@ impl Glance {
         statistics: Option<&Statistics>,
         witness: &Witness,
         is_trusted: bool,
+        ripples: &Ripples,
         last: Option<&Around>,
         filling: u64,
     ) -> Option<Self> {
@@ -114,6 +114,7 @@ impl Glance {
             witness: witness.clone(),
             place: LocalPoint::new(mean(&|p| p.north_m), mean(&|p| p.east_m)),
             is_trusted,
+            ripples: ripples.clone(),
             last: last.cloned(),
             at: newest.stamp,
             filling,
@@ -124,20 +125,22 @@ impl Glance {
     #[must_use]
     pub fn look(self) -> Around {
         let is_fresh = |last: &&Around| (0.0..DIRECTIONS_PERIOD_S).contains(&self.at.seconds_since(last.directions_at));
-        let (directional, testimony, rings, directions_at) = match self.last.as_ref().filter(is_fresh) {
-            Some(last) => (last.directional, last.testimony.clone(), last.rings.clone(), last.directions_at),
-            None => (self.directions(), self.testimony(), quality::downwash(&self.window), self.at),
+        let (directions, testimony, directions_at) = match self.last.as_ref().filter(is_fresh) {
+            Some(last) => (last.directions.clone(), last.testimony.clone(), last.directions_at),
+            None => (self.directions(), self.testimony(), self.at),
         };
         let spectral = self.statistics.as_ref().and_then(|statistics| statistics.spectral.as_ref());
         let calm = spectral
-            .zip(directional.as_ref())
+            .zip(directions.as_ref())
             .filter(|_| self.is_trusted)
-            .and_then(|(spectral, directional)| calm(&self.window, spectral, directional, self.place, &self.config));
-        Around { at: self.at, directions_at, directional, calm, testimony, rings, filling: self.filling }
+            .and_then(|(spectral, directions)| calm(&self.window, spectral, directions, self.place, &self.config));
+        let mut ripples = self.ripples;
+        ripples.look(self.window.grids(), self.at, self.config.window_s);
+        Around { at: self.at, directions_at, directions, calm, testimony, ripples, filling: self.filling }
     }
 
     /// Without waves above the noise there are none.
-    fn directions(&self) -> Option<Directional> {
+    fn directions(&self) -> Option<Directions> {
         let (statistics, interval_s) = (self.statistics.as_ref()?, self.window.interval_s()?);
         directional(&film(&self.window, interval_s)?, statistics.t_z_s?.value, statistics.freedom)
     }

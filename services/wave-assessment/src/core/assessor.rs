@@ -8,6 +8,7 @@ use super::around::{Around, Glance};
 use super::hidden::{Hidden, hidden};
 use super::patch::{self, PatchError};
 use super::quality;
+use super::ripples::Ripples;
 use super::series::Series;
 use super::statistics::Statistics;
 use super::verdict::{Evidence, Judgement, judge};
@@ -30,6 +31,7 @@ pub struct Assessor {
     /// What the last sea state rests on, and whether it could be trusted.
     statistics: Option<Statistics>,
     is_trusted: bool,
+    ripples: Ripples,
     around: Option<Around>,
     /// Counts how often the window was filled anew.
     filling: u64,
@@ -53,6 +55,7 @@ impl Assessor {
             verdict,
             statistics: None,
             is_trusted: false,
+            ripples: Ripples::default(),
             around: None,
             filling: 0,
         })
@@ -83,7 +86,7 @@ impl Assessor {
                 }
             }
         }
-        self.window.add(patch, self.config.window_s, self.config.spot_radius_m, self.config.slope_baseline_m);
+        self.window.add(patch, self.ripples.radius_m(), &self.config);
         // Half an interval early is on time: stamps are not exact multiples of the period.
         let early_s = 0.5 * self.window.interval_s().unwrap_or(0.0);
         if self.assessed.is_some_and(|last| patch.stamp.seconds_since(last) < self.config.period_s - early_s) {
@@ -123,6 +126,7 @@ impl Assessor {
             self.statistics.as_ref(),
             &self.witness,
             self.is_trusted,
+            &self.ripples,
             self.around.as_ref(),
             self.filling,
         )
@@ -131,6 +135,7 @@ impl Assessor {
     /// Takes in what a glance found. One from before the window was filled anew is of no use.
     pub fn notice(&mut self, around: Around) {
         if around.is_of(self.filling) {
+            self.ripples.clone_from(around.ripples());
             self.around = Some(around);
         }
     }
@@ -176,6 +181,7 @@ impl Assessor {
         self.issued = None;
         self.verdict = VerdictState::Inconclusive;
         self.statistics = None;
+        self.ripples = Ripples::default();
         self.around = None;
         self.filling += 1;
     }
@@ -193,7 +199,7 @@ impl Assessor {
             (hidden, series, statistics)
         });
         let (hidden, series, statistics) = measured.map_or((None, None, None), |(h, s, t)| (Some(h), Some(s), t));
-        let rings = self.around.as_ref().and_then(|around| around.rings(newest)).cloned();
+        let rings = self.ripples.flag();
         let evidence = Evidence {
             observed_s: series.as_ref().map_or(0.0, |s| s.observed_s),
             coverage: mean(&|f| f.coverage),

@@ -9,6 +9,7 @@
 //! | film | the window's grids over one piece of water, for directions |
 //! | glance | a look around, apart from the patches: directions, quiet moments, rotors' ripples, the witness |
 //! | witness | the rig's rangefinder, which has to see the same waves |
+//! | ripples | rings that the vehicle's own rotors press into the water: no waves of the sea |
 //! | hidden part | waves longer than the footprint: a patch's own mean level takes them out of its grid |
 //!
 //! Nothing here knows the bus, the disk or a clock: `now` is an argument.
@@ -27,11 +28,14 @@ mod oracle;
 mod patch;
 mod quality;
 mod records;
+mod ripples;
 mod sampling;
 mod series;
 mod smooth;
 mod spectrum;
 mod statistics;
+#[cfg(test)]
+mod synthetic;
 mod verdict;
 mod window;
 mod witness;

@@ -70,10 +70,11 @@ fn patches(seed: u64, late: usize, lost: f64, jumps: bool) -> Vec<SurfacePatch> 
 
 /// The window after all of them; what it holds is looked at after each.
 fn window(patches: &[SurfacePatch]) -> Window {
+    let config = Config { window_s: WINDOW_S, spot_radius_m: SPOT_M, slope_baseline_m: 0.4, ..Config::default() };
     let mut window = Window::default();
     let mut kept: Vec<(Stamp, LocalPoint)> = Vec::new();
     for patch in patches {
-        window.add(patch, WINDOW_S, SPOT_M, 0.4);
+        window.add(patch, None, &config);
         let grid = &patch.grid;
         let half_m = |cells: u32| 0.5 * (f64::from(cells - 1) * grid.cell_m);
         let centre = LocalPoint::new(grid.south_west_north_m + half_m(grid.rows), grid.south_west_east_m + half_m(grid.cols));

@@ -132,12 +132,20 @@ impl Series {
         duration_s
     }
 
-    /// The series at the centre of the patch, oldest first.
+    /// The gauge to show: the central one, or the one that saw the most where that one saw less than half of it. `None` without any.
+    pub(crate) fn shown(&self) -> Option<usize> {
+        let samples = |slot: usize| self.stretches.iter().filter(|s| s.slot == slot).map(|s| s.times_s.len()).sum::<usize>();
+        let best = self.stretches.iter().map(|s| s.slot).max_by_key(|slot| samples(*slot))?;
+        Some(if 2 * samples(CENTRE) >= samples(best) { CENTRE } else { best })
+    }
+
+    /// The series at the gauge that is shown, oldest first.
     pub(crate) fn trace(&self) -> Vec<TracePoint> {
+        let shown = self.shown();
         let mut trace: Vec<TracePoint> = self
             .stretches
             .iter()
-            .filter(|s| s.slot == CENTRE)
+            .filter(|s| Some(s.slot) == shown)
             .flat_map(|s| s.times_s.iter().zip(&s.elevation_m))
             .map(|(time_s, elevation_m)| TracePoint { stamp: self.start.plus_secs_f64(*time_s), elevation_m: *elevation_m })
             .collect();

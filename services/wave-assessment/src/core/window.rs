@@ -8,7 +8,9 @@ use halcyon_model::{ElevationGrid, LocalPoint, Stamp, SurfacePatch};
 use super::film::Raster;
 use super::gauge::{GAUGES, Gauges, Reading};
 use super::hidden::Bend;
+use super::ripples::without_disc;
 use super::smooth::Smoothed;
+use crate::config::Config;
 
 /// Never more frames than this, whatever the rate: the oldest go first.
 const FRAMES_MAX: usize = 4096;
@@ -62,13 +64,17 @@ pub(crate) struct Window {
 }
 
 impl Window {
-    /// Adds a checked patch at its place in time, and drops what is older than `window_s` or further than `spot_radius_m` from the newest.
-    pub(crate) fn add(&mut self, patch: &SurfacePatch, window_s: f64, spot_radius_m: f64, slope_baseline_m: f64) {
+    /// Adds a checked patch at its place in time, and drops what is older than the window or too far from the newest. Nothing is read within
+    /// `rippled_m` of the patch's middle.
+    pub(crate) fn add(&mut self, patch: &SurfacePatch, rippled_m: Option<f64>, config: &Config) {
+        let Config { window_s, spot_radius_m, slope_baseline_m, .. } = *config;
         let grid = &patch.grid;
+        let rest = rippled_m.map(|radius_m| without_disc(patch, radius_m));
+        let read = rest.as_ref().unwrap_or(patch);
         let (height_m, width_m) = (f64::from(grid.rows - 1) * grid.cell_m, f64::from(grid.cols - 1) * grid.cell_m);
         let centre = LocalPoint::new(grid.south_west_north_m + 0.5 * height_m, grid.south_west_east_m + 0.5 * width_m);
         let (seen, fingerprint) = survey(grid);
-        let readings = self.gauges.read(patch);
+        let readings = self.gauges.read(read);
         let frame = Frame {
             stamp: patch.stamp,
             centre,
@@ -78,9 +84,9 @@ impl Window {
             footprint_m: height_m.min(width_m).min((seen * height_m * width_m).sqrt()).max(grid.cell_m),
             smoothing: Smoothed::of(readings.iter().flatten().map(|reading| &reading.samples)),
             readings,
-            bend: Bend::of(patch),
+            bend: bend(patch, rest.as_ref()),
             attitude_sigma_rad: patch.attitude_sigma_rad,
-            slope: slope(grid, slope_baseline_m),
+            slope: slope(&read.grid, slope_baseline_m),
             level_m: patch.level_m,
             level_sigma_m: patch.level_sigma_m,
             distance_m: patch.plane.distance_m,
@@ -140,6 +146,15 @@ impl Window {
         let middle = steps.len() / 2;
         (!steps.is_empty()).then(|| *steps.select_nth_unstable_by(middle, f64::total_cmp).1)
     }
+}
+
+/// How a patch is bent of which only the cells of `rest`, if given, are waves: all cells tell the curvature, which goes with the level of all (and
+/// ripples bend nothing), and those of the rest how they are tilted and how high they go.
+fn bend(patch: &SurfacePatch, rest: Option<&SurfacePatch>) -> Option<Bend> {
+    let whole = Bend::of(patch)?;
+    let Some(rest) = rest else { return Some(whole) };
+    let Bend { half_laplacian_per_m, sigma_per_m, sides_m, .. } = whole;
+    Some(Bend { half_laplacian_per_m, sigma_per_m, sides_m, ..Bend::of(rest)? })
 }
 
 /// Share of cells with a measurement, and a hash of them; no hash where there is none.
