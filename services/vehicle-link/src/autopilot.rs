@@ -322,7 +322,7 @@ impl Autopilot {
         for effect in effects {
             match effect {
                 Effect::Send(MavMessage::COMMAND_LONG(data)) if data.command == MavCmd::MAV_CMD_NAV_TAKEOFF => {
-                    data.param7 -= rise_m
+                    data.param7 -= rise_m;
                 }
                 Effect::Send(MavMessage::COMMAND_INT(data)) if data.command == MavCmd::MAV_CMD_NAV_TAKEOFF => data.z -= rise_m,
                 _ => {}

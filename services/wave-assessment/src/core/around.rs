@@ -88,18 +88,21 @@ pub struct Glance {
     filling: u64,
 }
 
+/// What an assessor knows.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Known<'a> {
+    pub(super) window: &'a Window,
+    pub(super) config: &'a Config,
+    pub(super) statistics: Option<&'a Statistics>,
+    pub(super) is_trusted: bool,
+    pub(super) witness: &'a Witness,
+    pub(super) ripples: &'a Ripples,
+}
+
 impl Glance {
-    /// One at what `window` shows, where `last` is so old that it is time.
-    pub(super) fn due(
-        window: &Window,
-        config: &Config,
-        statistics: Option<&Statistics>,
-        witness: &Witness,
-        is_trusted: bool,
-        ripples: &Ripples,
-        last: Option<&Around>,
-        filling: u64,
-    ) -> Option<Self> {
+    /// One at what the window shows, where `last` is so old that it is time.
+    pub(super) fn due(known: Known<'_>, last: Option<&Around>, filling: u64) -> Option<Self> {
+        let Known { window, config, statistics, is_trusted, witness, ripples } = known;
         let newest = window.newest()?;
         // Stamps that went back are those of another time.
         if last.is_some_and(|last| (0.0..CALM_PERIOD_S).contains(&newest.stamp.seconds_since(last.at))) {

@@ -4,7 +4,7 @@ use halcyon_model::{
     IdError, LocalPoint, RigId, SeaState, Stamp, SurfacePatch, VehicleState, Verdict, VerdictReason, VerdictState,
 };
 
-use super::around::{Around, Glance};
+use super::around::{Around, Glance, Known};
 use super::hidden::{Hidden, hidden};
 use super::patch::{self, PatchError};
 use super::quality;
@@ -120,16 +120,15 @@ impl Assessor {
     /// The look around that it is time for, if it is; to be taken anywhere, and what it finds to be [noticed](Self::notice).
     #[must_use]
     pub fn glance(&self) -> Option<Glance> {
-        Glance::due(
-            &self.window,
-            &self.config,
-            self.statistics.as_ref(),
-            &self.witness,
-            self.is_trusted,
-            &self.ripples,
-            self.around.as_ref(),
-            self.filling,
-        )
+        let known = Known {
+            window: &self.window,
+            config: &self.config,
+            statistics: self.statistics.as_ref(),
+            is_trusted: self.is_trusted,
+            witness: &self.witness,
+            ripples: &self.ripples,
+        };
+        Glance::due(known, self.around.as_ref(), self.filling)
     }
 
     /// Takes in what a glance found. One from before the window was filled anew is of no use.
