@@ -177,7 +177,10 @@ impl From<&model::Activity> for Activity {
                 json.reason = Some(reason.clone());
                 ActivityKind::FailSafe
             }
-            From::PilotControl => ActivityKind::PilotControl,
+            From::PilotControl => {
+                json.reason = Some("not flown by Halcyon: set GUIDED to hand it back, which may start its motors".into());
+                ActivityKind::PilotControl
+            }
         };
         json
     }

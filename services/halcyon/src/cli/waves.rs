@@ -358,7 +358,9 @@ pub(super) fn rows(burst: &Burst) -> Vec<(String, String)> {
     if let Some(shape) = &burst.shape {
         shape_rows(shape, &mut add);
     }
-    add("skewness, kurtosis", format!("{}, {}", four(burst.skewness), four(burst.kurtosis)));
+    if burst.skewness.is_finite() {
+        add("skewness, kurtosis", format!("{}, {}", four(burst.skewness), four(burst.kurtosis)));
+    }
     for of in &burst.crest_statistics {
         add(
             &format!("highest of {}, {}", of.of, of.theory),

@@ -251,5 +251,6 @@ fn away_from_home(state: &VehicleState, named: bool, config: &Config) -> Option<
     // Its link may just have been restarted, and heard everything else sooner.
     let Some(home) = state.home else { return Some("its home is not known, so that it may be on the water".into()) };
     let away_m = LocalFrame::new(home).ned_from_geodetic(state.position).xy().norm();
-    (away_m > config.home_radius_m).then(|| format!("on the ground {away_m:.0} m from its home"))
+    (away_m > config.home_radius_m)
+        .then(|| format!("on the ground {away_m:.0} m from its home: name it in the mission, or have it take off and return"))
 }

@@ -77,6 +77,8 @@ impl Autopilot {
             return;
         }
         self.armed = false;
+        // As ArduCopter has it, wherever it is.
+        self.landed = true;
         self.idle_since = None;
         self.text(MavSeverity::MAV_SEVERITY_INFO, "Disarming motors");
         self.hurry_heartbeat();

@@ -124,10 +124,9 @@ impl Control {
             // Armed by someone in a mode that isn't ours, even while we ask for another: we arm only in GUIDED.
             self.hands_off = true;
         } else if disarmed {
-            // The flight is over; so is whoever's turn it was.
+            // The flight is over; so is whoever's turn it was. After ours, another mode is somebody's wish, as before it.
             is_over = self.hands_off;
             self.hands_off = false;
-            self.ours = None;
         }
         if changed && !first {
             self.since_start = false;
@@ -222,6 +221,17 @@ mod tests {
         assert!(control.hands_off(), "until the autopilot says GUIDED it is the pilot's");
         control.observe(Guided, false, t(5.0));
         assert!(!control.hands_off());
+    }
+
+    #[test]
+    fn after_our_flight_another_mode_is_the_pilots() {
+        let mut control = Control::default();
+        control.observe(Guided, true, t(0.0));
+        control.expect(Land, t(1.0));
+        control.observe(Land, true, t(1.2));
+        assert_eq!(control.observe(Land, false, t(30.0)), Change::None);
+        assert_eq!(control.observe(Loiter, false, t(40.0)), Change::TakenOver);
+        assert_eq!(control.observe(Guided, false, t(50.0)), Change::HandedBack);
     }
 
     #[test]

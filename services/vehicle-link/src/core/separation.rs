@@ -101,6 +101,9 @@ pub fn onward(track: &Track, own_follows: bool, limits: &Limits, now: Stamp) -> 
     Some(Obstacle { position_ned_m, velocity_ned_mps, keep_m, ..stopped })
 }
 
+/// A climb that must be slower by more than this is blocked, and so fast it goes aside then: metres per second.
+const BLOCKED_MPS: f64 = 0.02;
+const ASIDE_MPS: f64 = 1.0;
 /// A vehicle is below another within 45° of the vertical.
 const BELOW: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
@@ -131,7 +134,13 @@ fn side(point_ned_m: Vector3<f64>, obstacle: &Obstacle) -> Vector3<f64> {
 }
 
 /// What `obstacle` forbids at that point: one half-space, or two. `side` is where the vehicle itself is.
-fn constraints(point_ned_m: Vector3<f64>, obstacle: &Obstacle, own_side: Vector3<f64>) -> impl Iterator<Item = Constraint> {
+/// It wants to sink by `wanted_down_mps`: where it wants to climb and may not, it goes aside, or it would hang there.
+fn constraints(
+    point_ned_m: Vector3<f64>,
+    obstacle: &Obstacle,
+    own_side: Vector3<f64>,
+    wanted_down_mps: f64,
+) -> impl Iterator<Item = Constraint> {
     let one = constraint(point_ned_m, obstacle);
     if one.normal.z < BELOW {
         return [Some(one), None].into_iter().flatten();
@@ -140,7 +149,8 @@ fn constraints(point_ned_m: Vector3<f64>, obstacle: &Obstacle, own_side: Vector3
     // as fast as makes it at 45°.
     let up = Constraint { normal: Vector3::z(), push: Vector3::z(), bound_mps: one.bound_mps.min(0.0), give: one.give };
     let side = Some(side(point_ned_m, obstacle)).filter(|side| side.dot(&own_side) >= 0.0).unwrap_or(own_side);
-    let bound_mps = one.bound_mps / BELOW;
+    let is_blocked = wanted_down_mps < up.bound_mps - BLOCKED_MPS;
+    let bound_mps = f64::max(one.bound_mps / BELOW, if is_blocked { ASIDE_MPS } else { f64::NEG_INFINITY });
     let aside = (bound_mps > 0.0).then_some(Constraint { normal: side, push: side, bound_mps, give: one.give });
     [Some(up), aside].into_iter().flatten()
 }
@@ -246,7 +256,7 @@ pub fn filter(
     let lead_m = points_ned_m[1] - points_ned_m[0];
     let pairs = obstacles.iter().flat_map(|obstacle| {
         let own_side = side(points_ned_m[0], obstacle);
-        let [own, reference] = points_ned_m.map(|point| constraints(point, obstacle, own_side));
+        let [own, reference] = points_ned_m.map(|point| constraints(point, obstacle, own_side, wanted_ned_mps.z));
         // The autopilot flies after its reference by this much faster than it is asked to; after a place that has leapt it doesn't fly.
         let chased = own.map(move |one| {
             let chase_mps = (-one.normal.dot(&lead_m) * CHASE_HZ).clamp(0.0, limits.speed_mps_max);
@@ -353,11 +363,12 @@ mod tests {
             let leaves_mps = velocity.dot(&(own - above.position_ned_m).normalize());
             assert!(leaves_mps > 0.3 && velocity.norm() < 4.5, "{x}: {velocity}");
         }
-        // Far below it climbs, as fast as it can still stop.
+        // Far below it climbs, as fast as it can still stop; faster it may only beside.
         let own = Vector3::new(0.0, 0.0, -1.0);
         let high = still(0.0, 0.0, -9.0);
-        let climb = filter(Vector3::new(0.0, 0.0, -3.0), [own, own], own, &[high], &limits);
-        assert!((climb.z - opening_mps_min(3.0)).abs() < 1e-6 && climb.xy().norm() < 1e-9, "{climb}");
+        let climb = |mps: f64| filter(Vector3::new(0.0, 0.0, -mps), [own, own], own, &[high], &limits);
+        assert_eq!(climb(1.0), Vector3::new(0.0, 0.0, -1.0));
+        assert!((climb(3.0).z - opening_mps_min(3.0)).abs() < 1e-6 && climb(3.0).xy().norm() > 0.9, "{}", climb(3.0));
     }
 
     /// In a crowd that leaves a way: everybody's distance is kept, and of thousands of velocities that keep it none is nearer to

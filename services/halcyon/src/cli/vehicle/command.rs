@@ -2,34 +2,40 @@
 
 use serde_json::{Value, json};
 
+/// A number that is one.
+fn finite(text: &str) -> Result<f64, String> {
+    let number: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    if number.is_finite() { Ok(number) } else { Err("not a finite number".into()) }
+}
+
 #[derive(Debug, clap::Subcommand)]
 pub(super) enum Action {
     /// Arm the motors
     Arm,
     /// Disarm on the ground
     Disarm,
-    /// Climb to a height above the take-off point
+    /// Climb to a height above the take-off point, the safe height (`vehicle_link.limits`) at least
     TakeOff {
         /// Metres
-        #[arg(long)]
+        #[arg(long, allow_negative_numbers = true, value_parser = finite)]
         height: f64,
     },
     /// Fly to a place
     GoTo {
         /// Metres north of the fleet's origin
-        #[arg(long, allow_negative_numbers = true, requires = "east", required_unless_present = "latitude")]
+        #[arg(long, allow_negative_numbers = true, value_parser = finite, requires = "east", required_unless_present = "latitude")]
         north: Option<f64>,
         /// Metres east of the fleet's origin
-        #[arg(long, allow_negative_numbers = true, requires = "north")]
+        #[arg(long, allow_negative_numbers = true, value_parser = finite, requires = "north")]
         east: Option<f64>,
         /// Latitude, degrees
-        #[arg(long, allow_negative_numbers = true, requires = "longitude", conflicts_with = "north")]
+        #[arg(long, allow_negative_numbers = true, value_parser = finite, requires = "longitude", conflicts_with = "north")]
         latitude: Option<f64>,
         /// Longitude, degrees
-        #[arg(long, allow_negative_numbers = true, requires = "latitude", conflicts_with = "east")]
+        #[arg(long, allow_negative_numbers = true, value_parser = finite, requires = "latitude", conflicts_with = "east")]
         longitude: Option<f64>,
         /// Metres above the mean water
-        #[arg(long)]
+        #[arg(long, allow_negative_numbers = true, value_parser = finite)]
         height: f64,
     },
     /// Keep a slot beside a leader, in its heading's frame
@@ -37,13 +43,13 @@ pub(super) enum Action {
         /// Its id
         leader: String,
         /// Metres ahead of it
-        #[arg(long, allow_negative_numbers = true, default_value_t = 0.0)]
+        #[arg(long, allow_negative_numbers = true, value_parser = finite, default_value_t = 0.0)]
         forward: f64,
         /// Metres to its right
-        #[arg(long, allow_negative_numbers = true)]
+        #[arg(long, allow_negative_numbers = true, value_parser = finite)]
         right: f64,
         /// Metres above it
-        #[arg(long, allow_negative_numbers = true, default_value_t = 0.0)]
+        #[arg(long, allow_negative_numbers = true, value_parser = finite, default_value_t = 0.0)]
         up: f64,
     },
     /// Stop and hold
@@ -52,7 +58,7 @@ pub(super) enum Action {
     Land,
     /// Fly home and land
     Return,
-    /// Change the flight mode
+    /// Change the flight mode; GUIDED hands a vehicle back that its pilot has, and starts at once what a plan asks of it
     SetMode {
         /// In ArduCopter's words, such as LOITER
         mode: String,
@@ -60,7 +66,7 @@ pub(super) enum Action {
     /// Turn to a heading
     SetHeading {
         /// Degrees clockwise from true north
-        #[arg(allow_negative_numbers = true)]
+        #[arg(allow_negative_numbers = true, value_parser = finite)]
         degrees: f64,
     },
     /// Stop the motors now, in the air or not

@@ -4,9 +4,9 @@ use halcyon_model::{
     FlightMode, ItemKind, LandedState, LocalPoint, Severity, Stamp, VehicleAction, VehicleCommand, VehicleState,
 };
 
-use super::{Direct, Executor, Goal};
+use super::{Direct, Executor, Goal, how_to_hand_back};
 use crate::core::commands::Command;
-use crate::core::interlock::{self, mode_name};
+use crate::core::interlock;
 use crate::core::mode::Family;
 use crate::core::transfers::Request;
 
@@ -71,7 +71,7 @@ impl Executor {
             _ => {}
         }
         if self.control.hands_off() {
-            return Err(format!("the pilot has the vehicle ({}); set GUIDED to take it back", mode_name(own.state.mode)));
+            return Err(format!("the pilot has the vehicle: {}", how_to_hand_back(&own.state)));
         }
         let own = own.state;
         match *action {

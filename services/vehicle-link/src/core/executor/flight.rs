@@ -25,6 +25,8 @@ pub(super) const LOW_M: f64 = 0.7;
 /// per second, metres per second squared.
 pub(super) const REFUSED_MPS: f64 = 0.3;
 const BRAKING_MPS2_MAX: f64 = 4.0;
+/// A climb that it has slowed by more than this is into somebody, metres per second: a climb begins slowly.
+const CLIMB_REFUSED_MPS: f64 = 0.02;
 /// Setpoints end this far inside the fence, metres.
 const FENCE_INSIDE_M: f64 = 2.0;
 
@@ -264,7 +266,7 @@ impl Executor {
         limit_velocity(&mut velocity, limits, limits.descent_mps);
         reference.advance(velocity, step.here_ned_m, step.dt_s);
         // The floor lifts nobody into whoever is above.
-        let is_under = velocity.z > wanted.z + REFUSED_MPS && wanted.z < 0.0;
+        let is_under = velocity.z > wanted.z + CLIMB_REFUSED_MPS && wanted.z < 0.0;
         let floor_m = if is_under { floor_m.min(step.height_m()) } else { floor_m };
         let Reference { position_ned_m, velocity_ned_mps } = self.bounded(reference, floor_m, step);
         // Somebody is in the way: what the velocity loop would do in half a second is asked for at once.

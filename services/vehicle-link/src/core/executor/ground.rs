@@ -188,6 +188,9 @@ impl Executor {
         if !own.estimator_ok {
             return Some("waiting for the estimator's position".into());
         }
+        if !own.armed && matches!(own.landed, LandedState::InAir | LandedState::TakingOff | LandedState::Landing) {
+            return Some("the autopilot says that it is in the air".into());
+        }
         if !own.armed && !own.ready_to_arm {
             return Some("waiting for the autopilot's arming checks".into());
         }

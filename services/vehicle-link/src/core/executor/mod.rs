@@ -221,6 +221,8 @@ pub struct Executor {
     home: Home,
     /// A person wants the motors stopped, whatever it does.
     terminated: Option<Stamp>,
+    /// Somebody flew it when it was first heard: he may have taken it from our predecessor.
+    found_taken: bool,
     /// It came down though it was not to.
     fell: Option<Stamp>,
     ask_streams: bool,
@@ -274,6 +276,7 @@ impl Executor {
             withdraw: false,
             home: Home::default(),
             terminated: None,
+            found_taken: false,
             fell: None,
             ask_streams: false,
         }
@@ -395,9 +398,7 @@ impl Executor {
         if self.control.hands_off() {
             self.let_go();
             self.fail_safes.released();
-            // Only a change shows from afar.
-            let anew = if own.state.mode == FlightMode::Guided { "it anew, from another mode," } else { "GUIDED" };
-            let how = format!("mode {}; set {anew} to hand back", mode_name(own.state.mode));
+            let how = how_to_hand_back(&own.state);
             match self.autopilot_fail_safe(now) {
                 Some(words) => self.set(Activity::FailSafe { reason: format!("autopilot: {words}") }, how),
                 None => self.set(Activity::PilotControl, how),
@@ -543,6 +544,14 @@ impl Executor {
             }
         }
     }
+}
+
+/// How whoever has it hands it back, for people.
+pub(super) fn how_to_hand_back(state: &VehicleState) -> String {
+    // Set by a transmitter or past the relay, only a change shows.
+    let again = if state.mode == FlightMode::Guided { " again (with a transmitter: another mode first)" } else { "" };
+    let starts = if state.armed { "" } else { ", which may start the motors at once" };
+    format!("mode {}; set GUIDED{again} to hand back{starts}", mode_name(state.mode))
 }
 
 /// Whether it is one wish: the height of a take-off is by where it stands, which is not known to the last millimetre.

@@ -48,17 +48,19 @@ impl Executor {
                 if state.mode == FlightMode::Guided && !self.airborne {
                     self.flown = None;
                 }
+                self.found_taken = false;
                 self.note(Severity::Info, "the vehicle was handed back", mode_name(state.mode));
             }
             Change::Over => {
                 self.note(Severity::Info, "the pilot's flight is over", mode_name(state.mode));
                 // A task that came while he flew, or that our predecessor may have lost it in, doesn't start the motors in his hands.
-                if self.restarted_at.is_some() || self.goal().is_some_and(|goal| goal.wants_flight()) {
+                if std::mem::take(&mut self.found_taken) || self.goal().is_some_and(|goal| goal.wants_flight()) {
                     self.flown = self.goal();
                     self.control.let_go();
                 }
             }
         }
+        self.found_taken |= first && self.control.hands_off();
         if stopped {
             self.stands_down("the motors were stopped, not by us");
         }

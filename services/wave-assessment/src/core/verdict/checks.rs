@@ -81,9 +81,13 @@ impl Checks {
         let early = if self.filled < 1.0 { ", so early" } else { "" };
         let target =
             if margin < 1.0 { format!(" (by {:.0} % to become safe)", self.hysteresis * 100.0) } else { String::new() };
-        let text = format!(
-            "{what} {value:.3} {unit} ({low:.3} to {high:.3}; at most {sure:.3}{early}), {verb} the limit of {limit:.3} {unit}{target}"
-        );
+        let text = if measured.is_valid() {
+            format!(
+                "{what} {value:.3} {unit} ({low:.3} to {high:.3}; at most {sure:.3}{early}), {verb} the limit of {limit:.3} {unit}{target}"
+            )
+        } else {
+            format!("{what} is not known well enough to be held against the limit of {limit:.3} {unit}")
+        };
         self.add(name, outcome, text);
         let under = probability_under(measured, limit);
         self.probability = Some(self.probability.map_or(under, |least| least.min(under)));
