@@ -236,7 +236,16 @@ fn burst(raw: RawSeries<'_>, options: &WavesOptions) -> Result<Burst, WavesError
 fn analyse(raw: RawSeries<'_>, segment_s: f64, taper: Taper, band_hz: (f64, f64)) -> Result<Burst, String> {
     let assessment = assess(raw, &Limits { segment_s, ..quality_limits() });
     let Some(even) = &assessment.even else { return Err(too_long(raw).unwrap_or_else(|| why_none(&assessment.findings))) };
-    Burst::new(even, &assessment, (segment_s, taper), band_hz).map_err(|error| error.to_string())
+    let burst = Burst::new(even, &assessment, (segment_s, taper), band_hz).map_err(|error| error.to_string())?;
+    // A stray reading or two at its ends are no part that was left out.
+    let left_out_s = span_s(raw) - burst.duration_s;
+    Ok(Burst { left_out_s: (left_out_s > 0.02 * burst.duration_s).then_some(left_out_s), ..burst })
+}
+
+/// From the first to the last stamp, seconds; below zero where there is none.
+fn span_s(raw: RawSeries<'_>) -> f64 {
+    let finite = || raw.stamp_s.iter().copied().filter(|stamp| stamp.is_finite());
+    finite().fold(f64::NEG_INFINITY, f64::max) - finite().fold(f64::INFINITY, f64::min)
 }
 
 /// Whether there are more readings than are analysed at once.

@@ -414,3 +414,20 @@ fn the_json_lists_every_wave_and_every_line() {
         "{shape}"
     );
 }
+
+/// 250 s, a gap of 750 s, 200 s: the first is analysed, and the rest is told to be left out; without a gap nothing is.
+#[test]
+fn what_lies_beyond_a_long_gap_is_told_to_be_left_out() {
+    let files = Files::new();
+    let whole = table(12_001, 10.0, sea_m);
+    let time_s = |line: &str| line.split(',').next().and_then(|cell| cell.parse::<f64>().ok()).unwrap_or(0.0);
+    let gap: Vec<&str> = whole.lines().filter(|line| !(250.0..1000.0).contains(&time_s(line))).collect();
+    let found = waves(&options(files.put("gap.csv", gap.join("\n")), None)).unwrap().first;
+    assert!(
+        (found.duration_s - 250.0).abs() < 0.5 && (found.left_out_s.unwrap() - 950.0).abs() < 1.0,
+        "{:?}",
+        found.left_out_s
+    );
+    let found = waves(&options(files.put("whole.csv", &whole), None)).unwrap().first;
+    assert_eq!(found.left_out_s, None);
+}

@@ -299,6 +299,10 @@ fn print_burst(burst: &Burst) -> anyhow::Result<()> {
         four(burst.mean_m),
         four(burst.deviation_m)
     ))?;
+    if let Some(left_out_s) = burst.left_out_s {
+        let stretch = format!("{:.1} to {:.1} s", burst.start_s, burst.start_s + burst.duration_s);
+        output::line(&format!("only the longest stretch without a long gap, {stretch}: {left_out_s:.1} s are left out"))?;
+    }
     if let Some(slow_m) = burst.slow_deviation_m {
         output::line(&format!("slower than the waves, and taken off: {} m (tide, seiche or drift)", four(slow_m)))?;
     }

@@ -86,6 +86,10 @@ pub struct Burst {
     pub start_s: f64,
     /// Length, seconds.
     pub duration_s: f64,
+    /// Beside the longest stretch, which is analysed, the record spans so much more, seconds: before or after a gap too long to fill. Absent where
+    /// there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub left_out_s: Option<f64>,
     /// Mean elevation, metres.
     pub mean_m: f64,
     /// Standard deviation about the trend, metres.
@@ -300,6 +304,7 @@ impl Burst {
             rate_hz: record.rate_hz(),
             start_s: even.start_s,
             duration_s: record.duration_s(),
+            left_out_s: None,
             mean_m,
             deviation_m: record.variance_m2().sqrt(),
             slow_deviation_m,
