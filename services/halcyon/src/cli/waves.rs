@@ -400,8 +400,12 @@ fn shape_rows(shape: &cli::Shape, add: &mut impl FnMut(&str, String)) {
         _ => add("  noise floor", "none that stands out".into()),
     }
     for system in &shape.systems {
-        let (h, t_p, t_m02) = (four(system.h_m0_m), four(system.t_p_s), four(system.t_m02_s));
-        add(&format!("  {}", system.kind), format!("H_m0 {h} m, T_p {t_p} s, T_m02 {t_m02} s"));
+        let (h, t_p, t_m02, ratio) =
+            (four(system.h_m0_m), four(system.t_p_s), four(system.t_m02_s), significant(system.grown_ratio, 2));
+        add(
+            &format!("  {}", system.kind),
+            format!("H_m0 {h} m, T_p {t_p} s, T_m02 {t_m02} s; peak {ratio} of a fully grown sea's"),
+        );
     }
     let fits = [("JONSWAP fitted", &shape.jonswap), ("Pierson-Moskowitz fitted", &shape.pierson_moskowitz)];
     for (name, fit) in fits.into_iter().filter_map(|(name, fit)| Some((name, fit.as_ref()?))) {

@@ -64,14 +64,14 @@ pub fn operational_frequency(spectrum: &SampledSpectrum, limits: &SpectralLimits
         (_, b) if b >= limits.outside_share => Flag::Suspect,
         _ => Flag::Pass,
     };
-    let reason = format!(
+    let text = format!(
         "{:.1} % of the variance is outside {:?} Hz, the instrument's range, {:.1} % outside {:?} Hz, the place's",
         100.0 * instrument,
         limits.instrument_hz,
         100.0 * local,
         limits.local_hz
     );
-    Finding::new(Test::OperationalFrequency, flag, reason)
+    Finding::new(Test::OperationalFrequency, flag, reason(instrument + local, text))
 }
 
 /// Test 18: too large a share of the variance at low frequencies. (The manual compares it with swell and fetch at the place; what a
@@ -80,7 +80,11 @@ pub fn operational_frequency(spectrum: &SampledSpectrum, limits: &SpectralLimits
 pub fn energy_low(spectrum: &SampledSpectrum, limits: &SpectralLimits) -> Finding {
     let share = share_within(spectrum, &(0.0..=limits.low_hz));
     let flag = Flag::rising(share, limits.low_suspect_share, limits.low_fail_share);
-    Finding::new(Test::EnergyLow, flag, format!("{:.1} % of the variance is under {} Hz", 100.0 * share, limits.low_hz))
+    Finding::new(
+        Test::EnergyLow,
+        flag,
+        reason(share, format!("{:.1} % of the variance is under {} Hz", 100.0 * share, limits.low_hz)),
+    )
 }
 
 /// Too large a share of the variance at high frequencies: noise, ripples, or bad matches.
@@ -88,7 +92,16 @@ pub fn energy_low(spectrum: &SampledSpectrum, limits: &SpectralLimits) -> Findin
 pub fn energy_high(spectrum: &SampledSpectrum, limits: &SpectralLimits) -> Finding {
     let share = share_within(spectrum, &(limits.high_hz..=f64::INFINITY));
     let flag = Flag::rising(share, limits.high_suspect_share, limits.high_fail_share);
-    Finding::new(Test::EnergyHigh, flag, format!("{:.1} % of the variance is above {} Hz", 100.0 * share, limits.high_hz))
+    Finding::new(
+        Test::EnergyHigh,
+        flag,
+        reason(share, format!("{:.1} % of the variance is above {} Hz", 100.0 * share, limits.high_hz)),
+    )
+}
+
+/// `text`, where `share` is one.
+fn reason(share: f64, text: String) -> String {
+    if share.is_nan() { "there is no energy to speak of".into() } else { text }
 }
 
 /// Density of elevation and of slope at one frequency.

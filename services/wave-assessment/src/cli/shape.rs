@@ -53,6 +53,8 @@ pub struct Shape {
 pub struct System {
     /// `wind sea` or `swell`.
     pub kind: &'static str,
+    /// Density of its peak over that of a fully grown sea of its period: over 1 is wind sea (Portilla et al. 2009). Near 1 it hangs on chance.
+    pub grown_ratio: f64,
     /// 4 √m0 of its share, metres.
     pub h_m0_m: f64,
     /// Its peak period, seconds.
@@ -147,6 +149,7 @@ impl Shape {
                 .filter(|system| system.statistics.m0_m2 >= SYSTEM_SHARE_MIN * clean.moment(0, band_hz.0, band_hz.1))
                 .map(|system| System {
                     kind: kind(system.kind),
+                    grown_ratio: system.grown_ratio,
                     h_m0_m: system.statistics.h_m0_m,
                     t_p_s: system.peak.delft_s,
                     t_m02_s: system.statistics.t_m02_s,
