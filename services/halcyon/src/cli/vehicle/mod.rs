@@ -175,7 +175,8 @@ fn show(vehicle: &Value) -> anyhow::Result<()> {
         ),
         ("ready to arm", if vehicle["ready_to_arm"] == true { "yes" } else { "no" }.into()),
     ];
-    for (name, value) in rows {
+    let why = vehicle["activity"]["reason"].as_str().map(|reason| ("why", reason.to_owned()));
+    for (name, value) in why.into_iter().chain(rows) {
         output::line(&format!("  {name:<13} {value}"))?;
     }
     Ok(())
