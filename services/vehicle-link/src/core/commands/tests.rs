@@ -337,3 +337,15 @@ fn one_command_id_at_a_time_and_a_bounded_line() {
     let ended = commands.abandon();
     assert_eq!(ended.len(), OPEN_MAX);
 }
+
+/// The heartbeat that says "disarmed" may be from before the termination came, and the motors may start after it.
+#[test]
+fn a_termination_is_sent_until_it_is_acknowledged() {
+    let mut commands = Commands::default();
+    commands.submit(1, Command::Disarm { force: true }).unwrap();
+    assert_eq!(confirmations(&commands.poll(to(), &Texts::default(), t(0.0))), [0]);
+    commands.observe_heartbeat(FlightMode::Guided, false, t(0.5));
+    assert_eq!(confirmations(&commands.poll(to(), &Texts::default(), t(1.1))), [1]);
+    commands.observe_ack(&ack(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, MavResult::MAV_RESULT_ACCEPTED, OWN), OWN.0, OWN.1, t(1.2));
+    assert!(matches!(commands.poll(to(), &Texts::default(), t(1.3))[..], [Effect::Done(1, _, Ok(()))]));
+}

@@ -241,6 +241,16 @@ fn before_land_is_in_force_a_place_that_jumped_is_not_flown_to() {
         }
     });
     assert!(asked_for > 0);
+    // It jumps on while LAND is asked for.
+    world.copters[0].off = Vector3::new(24.0, 0.0, 0.0);
+    world.step();
+    world.run(3.0, |world| {
+        plan(world);
+        world.copters[0].mode = FlightMode::Guided;
+        let believed = world.copters[0].position + world.copters[0].off;
+        let setpoint = world.setpoint(0).unwrap();
+        assert!((setpoint.position_ned_m - believed).xy().norm() < 1.0, "{} {believed}", setpoint.position_ned_m);
+    });
 }
 
 /// The autopilot refuses to stop the motors afloat, or doesn't answer: only a refusal, with both witnesses, lets them be stopped all the same.
@@ -456,4 +466,56 @@ fn an_autopilot_that_starts_again_away_from_home_does_not_take_off_there() {
     assert!(world.executors[0].detail().contains("bring it home"), "{}", world.executors[0].detail());
     world.copters[0].position = Vector3::zeros();
     world.until(60.0, plan, |world| world.height(0) > 3.0);
+}
+
+/// Terminated low over the water, in LAND, where motors that stop are no fall.
+#[test]
+fn what_was_terminated_in_a_landing_stays_down() {
+    let mut world = World::new(&[(0.0, 0.0)]);
+    world.airborne(0, Vector3::new(40.0, 0.0, -5.0));
+    world.run(2.0, plan);
+    world.command(0, VehicleAction::Land);
+    world.until(30.0, plan, |world| world.copters[0].mode == FlightMode::Land && world.height(0) < 1.0);
+    world.command(0, VehicleAction::Terminate);
+    world.run(30.0, |world| {
+        world.plan(&[(0, survey(80.0, 0.0))], 5.0);
+        assert!(!asked(world, Command::Arm));
+    });
+    assert!(matches!(world.activity(0), Activity::PilotControl), "{:?}", world.activity(0));
+}
+
+/// Its height has drifted by 4 m in the flight: it is down all the same, and where it was to be.
+#[test]
+fn a_landing_counts_though_the_height_has_drifted() {
+    let mut world = World::new(&[(0.0, 0.0)]);
+    world.airborne(0, Vector3::new(40.0, 0.0, -5.0));
+    world.copters[0].off = Vector3::new(0.0, 0.0, -4.0);
+    world.copters[0].finds_ground = false;
+    let cleared = |world: &mut World| {
+        let until = world.now.plus_secs_f64(1.0);
+        world.plan(&[(0, super::world::land(40.0, 0.0, Some(until)))], 5.0);
+    };
+    world.until(90.0, cleared, |world| world.copters[0].mode == FlightMode::Land);
+    world.copters[0].finds_ground = true;
+    world.until(10.0, cleared, |world| !world.copters[0].armed);
+    let touchdown = world.executors[0].touchdown().unwrap();
+    assert!(touchdown.distance_m(&halcyon_model::LocalPoint::new(40.0, 0.0)) < 1.0, "{touchdown:?}");
+}
+
+/// The autopilot would not fix home for this take-off; for the next it is asked again.
+#[test]
+fn home_that_was_declined_is_asked_for_again_before_the_next_flight() {
+    let mut world = World::new(&[(0.0, 0.0)]);
+    let result = crate::core::commands::Refusal::Listed("denied");
+    let declined = Err(CommandError::Refused { result, words: None });
+    let now = world.now;
+    world.executors[0].observe_outcome(&Command::SetHome, &declined, now);
+    world.until(60.0, plan, |world| {
+        assert!(!asked(world, Command::SetHome));
+        world.height(0) > 3.0
+    });
+    world.command(0, VehicleAction::Land);
+    world.until(60.0, plan, |world| !world.copters[0].armed);
+    world.run(2.0, plan);
+    world.until(30.0, |world| drop(world.plan(&[(0, survey(80.0, 0.0))], 5.0)), |world| asked(world, Command::SetHome));
 }
