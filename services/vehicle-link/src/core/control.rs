@@ -70,6 +70,12 @@ impl Control {
         *self = Self { last: self.last, unanswered: self.unanswered, hands_off: true, must_be_set: true, ..Self::default() };
     }
 
+    /// The autopilot started again with its motors off: the mode that it comes up in is nobody's wish.
+    pub fn started_again(&mut self) {
+        self.ours = None;
+        self.expected = None;
+    }
+
     /// Our clock went back.
     pub fn clock_went_back(&mut self, by_s: f64) {
         self.expected = self.expected.map(|(mode, at)| (mode, at.plus_secs_f64(-by_s)));

@@ -180,6 +180,8 @@ impl Executor {
             // On the ground, too: who changed its battery may hold it.
             self.control.let_go();
             self.flown = self.goal();
+        } else {
+            self.control.started_again();
         }
         let (severity, what) = if self.airborne {
             (Severity::Critical, "the autopilot started again in flight")

@@ -519,3 +519,18 @@ fn home_that_was_declined_is_asked_for_again_before_the_next_flight() {
     world.run(2.0, plan);
     world.until(30.0, |world| drop(world.plan(&[(0, survey(80.0, 0.0))], 5.0)), |world| asked(world, Command::SetHome));
 }
+
+/// Its battery is changed after the mission, and it comes up in STABILIZE: that is no pilot, and the next mission may have it.
+#[test]
+fn an_autopilot_that_starts_again_after_its_flight_is_nobodys() {
+    let mut world = World::new(&[(0.0, 0.0)]);
+    world.until(60.0, plan, |world| world.height(0) > 3.0);
+    let back = |world: &mut World| drop(world.plan(&[(0, halcyon_model::Task::Return)], 5.0));
+    world.until(120.0, back, |world| !world.copters[0].armed);
+    world.run(2.0, back);
+    world.copters[0].boot_s = 1.0;
+    world.copters[0].mode = FlightMode::Stabilize;
+    world.run(2.0, back);
+    assert!(!matches!(world.activity(0), Activity::PilotControl), "{:?}", world.activity(0));
+    world.until(60.0, |world| drop(world.plan(&[(0, survey(80.0, 0.0))], 5.0)), |world| world.height(0) > 3.0);
+}
