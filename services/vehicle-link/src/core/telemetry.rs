@@ -36,8 +36,8 @@ const SIGNAL_INVALID: u8 = 1;
 const AHEAD_S: f64 = 0.5;
 /// Home's altitude, the difference of the autopilot's two, steps by more than this only when home is set anew, metres.
 const HOME_STEP_M: f64 = 0.2;
-/// Landed further from home than this, it is elsewhere, metres: receivers wander.
-const HOME_WITHIN_M: f64 = 20.0;
+/// Further from home than this, it is elsewhere, metres: receivers wander.
+pub(super) const HOME_WITHIN_M: f64 = 20.0;
 /// A home that is higher above the water than this can be told from the water by the height, metres.
 const JETTY_M: f64 = 0.5;
 /// The boot clock's offset to the fleet's is the least delay seen in the last one to two of these, seconds.
@@ -291,7 +291,7 @@ impl Telemetry {
         let ned_m = |place| self.frame.ned_from_geodetic(place);
         let away_m = |home| (ned_m(home) - ned_m(position.geodetic)).xy().norm();
         let height_m = position.relative_altitude_m + self.home_height_m + self.home_rise_m;
-        let is_down = self.home_height_m > JETTY_M && height_m < 0.5 * self.home_height_m;
+        let is_down = is_beside_home(height_m, self.home_height_m);
         self.home_of_flight.is_some_and(|home| is_down || away_m(home) > HOME_WITHIN_M)
     }
 
@@ -420,6 +420,11 @@ impl Telemetry {
             has_payload: false,
         })
     }
+}
+
+/// Whether what stands or floats at a height above the water is beside a home at `home_height_m`, on the water, and not on it; both metres.
+pub(super) fn is_beside_home(height_m: f64, home_height_m: f64) -> bool {
+    home_height_m > JETTY_M && height_m < 0.5 * home_height_m
 }
 
 fn position(data: &ardu::GLOBAL_POSITION_INT_DATA, stamp: Stamp) -> Option<Position> {

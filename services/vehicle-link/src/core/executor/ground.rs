@@ -8,14 +8,11 @@ use crate::core::failsafe::{FailSafes, PlanHealth};
 use crate::core::interlock;
 use crate::core::mode::{Family, PX4_TAKE_OFF};
 use crate::core::px4::TakeOff;
+use crate::core::telemetry::{HOME_WITHIN_M, is_beside_home};
 
 /// A vehicle on the ground with a task to land counts as landed within this distance of the place, metres: after a restart of
 /// this service nothing else tells.
 const LANDED_WITHIN_M: f64 = 5.0;
-/// Nearer than this to home, it is there: receivers wander by metres.
-const HOME_WITHIN_M: f64 = 20.0;
-/// A home that is higher above the water than this can be told from the water by the height, metres.
-const JETTY_M: f64 = 0.5;
 /// A barometer drifts by no more than this in a flight, metres.
 const DRIFT_M_MAX: f64 = 5.0;
 /// Nothing that floats or stands has its rangefinder higher than this, metres.
@@ -162,9 +159,7 @@ impl Executor {
     /// Whether it stands where it is at home. ArduCopter takes home anew wherever it is armed, unless home was set: one that is armed
     /// on the water again would return to the water.
     fn is_home(&self, own: &VehicleState) -> bool {
-        let home_m = self.config.home_height_m;
-        // Beside a jetty it is not on it.
-        let is_down = home_m > JETTY_M && -own.position_ned_m.z < 0.5 * home_m;
+        let is_down = is_beside_home(-own.position_ned_m.z, self.config.home_height_m);
         own.home.is_none_or(|home| !is_down && self.is_near(own, home))
     }
 

@@ -77,6 +77,9 @@ impl Executor {
         if was_airborne && !self.airborne && self.falls(&state) {
             self.fell = Some(now);
         }
+        if self.airborne {
+            self.fell = None;
+        }
         let armed = state.armed;
         self.own = Some(Own { state, mode_heard });
         if was_airborne && !self.airborne {

@@ -534,3 +534,19 @@ fn an_autopilot_that_starts_again_after_its_flight_is_nobodys() {
     assert!(!matches!(world.activity(0), Activity::PilotControl), "{:?}", world.activity(0));
     world.until(60.0, |world| drop(world.plan(&[(0, survey(80.0, 0.0))], 5.0)), |world| world.height(0) > 3.0);
 }
+
+/// In GUIDED the autopilot says for a moment that it is on the ground; it flies on, and lands soon after: that is no fall.
+#[test]
+fn a_moment_on_the_ground_in_the_air_is_no_fall_of_a_later_landing() {
+    let mut world = World::new(&[(0.0, 0.0)]);
+    world.airborne(0, Vector3::new(40.0, 0.0, -5.0));
+    world.run(3.0, plan);
+    let now = world.now.plus_secs_f64(0.05);
+    let grounded = halcyon_model::VehicleState { landed: halcyon_model::LandedState::OnGround, ..world.copters[0].state(now) };
+    world.executors[0].observe_self(grounded, now, now);
+    world.run(1.0, plan);
+    world.command(0, VehicleAction::Land);
+    world.until(18.0, plan, |world| !world.copters[0].armed);
+    world.run(2.0, plan);
+    assert!(matches!(world.activity(0), Activity::Landed), "{:?}", world.activity(0));
+}
