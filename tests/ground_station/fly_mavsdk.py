@@ -91,8 +91,17 @@ def near(place, wanted, within_m):
     return math.dist(place, wanted) < within_m
 
 
+async def autopilot_type(system, within_s=10.0):
+    """MAVSDK finds a system by its first heartbeat, which may be the companion's; what autopilot it has it knows by the autopilot's own."""
+    for _ in range(int(within_s / 0.1)):
+        if await system.autopilot_type() == Autopilot.ARDUPILOT:
+            break
+        await asyncio.sleep(0.1)
+    return await system.autopilot_type()
+
+
 async def ready(system, watch, figures):
-    check("it is ArduPilot", await system.autopilot_type() == Autopilot.ARDUPILOT)
+    check("it is ArduPilot", await autopilot_type(system) == Autopilot.ARDUPILOT)
     check("it is a multicopter", await system.vehicle_type() == Vehicle.MULTICOPTER)
     version = await InfoAsync(system).get_version()
     figures["firmware"] = f"{version.flight_sw_major}.{version.flight_sw_minor}.{version.flight_sw_patch}"

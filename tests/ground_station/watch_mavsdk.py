@@ -19,11 +19,11 @@ from mavsdk.asyncio.plugins.info import InfoAsync
 from mavsdk.asyncio.plugins.param import ParamAsync
 from mavsdk.asyncio.plugins.telemetry import FlightMode, LandedState, TelemetryAsync
 
-from fly_mavsdk import Watch, check
+from fly_mavsdk import Watch, autopilot_type, check
 
 
 async def watched(system, watch, figures):
-    check("it is ArduPilot's", await system.autopilot_type() == Autopilot.ARDUPILOT)
+    check("it is ArduPilot's", await autopilot_type(system) == Autopilot.ARDUPILOT)
     version = await InfoAsync(system).get_version()
     figures["firmware"] = f"{version.flight_sw_major}.{version.flight_sw_minor}.{version.flight_sw_patch}"
     watch.start("position", "velocity_ned", "position_velocity_ned", "landed_state", "armed", "flight_mode", "health", "battery", "home")
